@@ -198,23 +198,34 @@ class Appearance:
     other: float = param(12.0, "chi²", "A larger cost means another person.")
     rate: float = param(0.05, "1", "Share by which a confirmed person's clothes move towards those in a new box.")
 
-    def cost(self, known: Clothes | None, seen: Clothes | None, *, slips: bool = True) -> float:
+    memory: float = param(0.98, "1", "Share of the variance that is kept from box to box.")
+    least: float = param(0.16, "1", "Lower limit of the variance that is believed.")
+    odd: float = param(4.0, "1", "The most that a box can show of the variance, times that known: it may be another's.")
+
+    def cost(self, known: Clothes | None, seen: Clothes | None, variance: float = 1.0, *, slips: bool = True) -> float:
         """Return how much the colours in a box differ from known clothes [chi-squared].
 
-        At most `max_shirt` + `max_trousers`; 0 where either is unknown. A box that is too low shows trousers in the
-        place of the shirt: where it may have slipped, the smaller cost of both readings counts.
+        At most `max_shirt` + `max_trousers`; 0 where either is unknown. `variance` is what boxes of one person have,
+        times that of `ColourSampling`. A box that is too low shows trousers in the place of the shirt: where it may
+        have slipped, the smaller cost of both readings counts.
         """
         if known is None or seen is None:
             return 0.0
         shirt, trousers = known.tolist()
         seen_shirt, seen_trousers = seen.tolist()
-        of_trousers = min(chi_squared(trousers, seen_trousers), self.max_trousers)
-        cost = min(chi_squared(shirt, seen_shirt), self.max_shirt) + of_trousers
-        return min(cost, min(chi_squared(trousers, seen_shirt), self.max_shirt) + of_trousers) if slips else cost
+        of_trousers = min(chi_squared(trousers, seen_trousers) / variance, self.max_trousers)
+        cost = min(chi_squared(shirt, seen_shirt) / variance, self.max_shirt) + of_trousers
+        slipped = min(chi_squared(trousers, seen_shirt) / variance, self.max_shirt) + of_trousers
+        return min(cost, slipped) if slips else cost
 
-    def learn(self, known: Clothes, seen: Clothes) -> Clothes:
+    def learn(self, known: Clothes, seen: Clothes, variance: float = 1.0) -> Clothes:
         """Move known clothes towards those in a box; a shirt or trousers that clearly differ are left out."""
-        return mixed(known, seen, self.rate, (self.max_shirt, self.max_trousers))
+        return mixed(known, seen, self.rate, (self.max_shirt * variance, self.max_trousers * variance))
+
+    def varied(self, variance: float, known: Clothes, seen: Clothes) -> float:
+        """Return the variance after one more box of a person in known clothes."""
+        off = min(float(((seen - known) ** 2).mean()), self.odd * variance)
+        return max(self.memory * variance + (1.0 - self.memory) * off, self.least)
 
 
 def mixed(known: Clothes, seen: Clothes, rate: float, most: float | tuple[float, float]) -> Clothes:

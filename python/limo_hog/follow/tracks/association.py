@@ -41,22 +41,23 @@ class Association:
         measurements: Sequence[Measurement],
         pose: Odometry,
         noise: Noise,
-        flat: AbstractSet[int] = frozenset(),
         others: AbstractSet[tuple[int, int]] = frozenset(),
+        variance: float = 1.0,
     ) -> dict[int, int]:
         """Pair people with boxes, confirmed people first, then by cost: index of the person -> index of the box.
 
-        `flat` boxes do not stand out from what is behind them: no confirmed person's; of the pairs `others` the scan
-        shows that the box is another's. Every track must be at the frame's stamp.
+        Of the pairs `others` it is known that the box is not that person's. `variance` is that of the clothes in one
+        person's boxes. Every track must be at the frame's stamp.
         """
         matches = []
         for who, person in enumerate(people):
             for which, seen in enumerate(measurements):
-                if (who, which) in others or (person.confirmed and which in flat):
+                if (who, which) in others:
                     continue
                 ranged, clothes_cost = seen, 0.0
                 if self.fits_size(person, seen):
-                    clothes_cost = self.appearance.cost(person.clothes, seen.clothes, slips=seen.is_low(self.low))
+                    slips = seen.is_low(self.low)
+                    clothes_cost = self.appearance.cost(person.clothes, seen.clothes, variance, slips=slips)
                 elif seen.range is not None:
                     if seen.range > bearing_range(person.track, pose)[1] + self.same_place:
                         # On something behind the person: further away, and of another size.

@@ -16,7 +16,7 @@ import numpy as np
 
 from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.measurement import WALK
-from limo_hog.follow.sense.observation import Clothes, chi_squared, mixed
+from limo_hog.follow.sense.observation import Clothes, mixed
 from limo_hog.follow.tracks.person import Person, separation
 from limo_hog.follow.tracks.tracker import Tracks
 
@@ -29,8 +29,6 @@ class Traits:
     clothes: Clothes | None  #: What is worn; None where no colour image tells.
     window: float  #: Height of the detection window, times the distance [px m]: the stature.
     boxes: int = 1  #: Boxes it was learnt from [1].
-    #: Variance of what the boxes show of these clothes, times that of `ColourSampling`.
-    variance: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,14 +53,11 @@ class Identity:
     """Moves the probabilities from frame to frame."""
 
     sure: float = param(0.95, "1", "From this probability on the person's place, clothes and stature are learnt.")
-    strange_shirt: float = param(0.1, "1", "How likely another is to wear just this shirt, at a variance of 1.")
-    strange_trousers: float = param(0.5, "1", "The same of the trousers.")
-    least_variance: float = param(0.16, "1", "Lower limit of the variance of clothes that is believed.")
-    odd_shirt: float = param(0.1, "1", "Share of boxes that show something else in the shirt's place.")
-    odd_trousers: float = param(0.3, "1", "The same of the trousers.")
+    strange: float = param(0.05, "1", "How likely another is to wear just these clothes, at a variance of 1.")
+    odd: float = param(0.05, "1", "Share of boxes that show something else in the place of the clothes.")
     stature_sigma: float = param(0.05, "1", "Standard deviation of the stature in the depth image, as a share.")
-    strange_stature: float = param(0.3, "1", "As `strange_shirt`, of the stature.")
-    odd_stature: float = param(0.3, "1", "As `odd_shirt`, of the stature.")
+    strange_stature: float = param(0.3, "1", "As `strange`, of the stature.")
+    odd_stature: float = param(0.3, "1", "As `odd`, of the stature.")
     again: float = param(0.5, "1", "Share of its own evidence that a box counts for after a track's first.")
     steady: float = param(0.1, "1", "The same for the stature, and for everything while the legs are the same.")
     stays: float = param(0.5, "1", "Probability from which a track counts as the person for `steady`.")
@@ -96,14 +91,19 @@ class Identity:
         for one in seen:
             number = one.number
             stays = before.get(number, 0.0) >= self.stays and number in walking
-            evidence = self._evidence(known, one, first=one.age <= 1)
+            evidence = self._evidence(known, one, tracks.variance, first=one.age <= 1)
             odds[number] *= math.exp(self.steady * evidence if stays else evidence)
         total = sum(odds.values()) + max(1.0 - sum(chances.values()), 1e-6)
         chances = {number: value / total for number, value in odds.items()}
         known = replace(known, chances=tuple(chances.items()))
         sure = max([chances[one.number] for one in seen], default=0.0) >= self.sure
         for one in seen:
-            known = self._learnt(known, one, chances[one.number], alone=one.number in alone, sure=sure)
+            chance = chances[one.number]
+            if chance >= self.sure:
+                traits = self._moved(known.traits, one, tracks.variance) if one.number in alone else known.traits
+                known = replace(known, place=one.track.place, at=one.measured, traits=traits)
+            elif sure and one.confirmed and chance <= 1.0 - self.sure:
+                known = self._other(known, one, tracks.variance)
         return known
 
     def _passed(
@@ -176,9 +176,8 @@ class Identity:
         gaps = [separation(one, person) for one in tracks.people if one is not person and one.measured >= lately]
         return min(gaps, default=math.inf) > self.meets
 
-    def _evidence(self, known: Likeness, person: Person, *, first: bool) -> float:
+    def _evidence(self, known: Likeness, person: Person, variance: float, *, first: bool) -> float:
         """Return how much more likely a person's last box is on the person followed than on another [log-odds]."""
-        variance = known.traits.variance
         same = self._fit(person, known.traits, variance, first=first)
         strange = self._fit(person, None, variance, first=first)
         for traits in known.others:
@@ -189,14 +188,13 @@ class Identity:
         """Return how likely a person's last box is on one who looks like this, or on anybody [log]."""
         clothes = stature = 0.0
         if person.worn is not None:
-            parts = (self.strange_shirt, self.odd_shirt), (self.strange_trousers, self.odd_trousers)
-            for part, (strange, odd) in enumerate(parts):
-                strange *= variance**1.5
-                if traits is None or traits.clothes is None:
-                    clothes += math.log(strange)
-                else:
-                    same = math.exp(-chi_squared(traits.clothes[part].tolist(), person.worn[part].tolist()) / 2 / variance)
-                    clothes += math.log((1.0 - odd) * same + odd * strange)
+            # The density of six numbers falls with the cube of their variance.
+            strange = self.strange * variance**3
+            same = strange
+            if traits is not None and traits.clothes is not None:
+                off = float(((traits.clothes - person.worn) ** 2).sum()) / variance
+                same = (1.0 - self.odd) * math.exp(-off / 2) + self.odd * strange
+            clothes = math.log(same)
         if person.tall is not None and traits is None:
             stature = math.log(self.strange_stature)
         elif person.tall is not None and traits is not None:
@@ -204,37 +202,30 @@ class Identity:
             stature = math.log((1.0 - self.odd_stature) * same + self.odd_stature * self.strange_stature)
         return clothes + stature if first else self.again * clothes + self.steady * stature
 
-    def _learnt(self, known: Likeness, person: Person, chance: float, *, alone: bool, sure: bool) -> Likeness:
-        """Learn who looks how: the person followed where `chance` is sure and they are `alone` in it, else others."""
-        if chance >= self.sure:
-            traits = self._moved(known.traits, person) if alone else known.traits
-            return replace(known, place=person.track.place, at=person.measured, traits=traits)
-        if not person.confirmed or chance > 1.0 - self.sure or not sure:
-            return known
-        rest = [traits for traits in known.others if traits.number != person.number]
-        mine = Traits(person.number, self._told_apart(person.clothes, known.traits), person.window)
-        return replace(known, others=(*rest, mine)[-self.remembered :])
+    def _other(self, known: Likeness, person: Person, variance: float) -> Likeness:
+        """Learn what another person looks like, who is seen beside the one followed."""
+        others = {traits.number: traits for traits in known.others}
+        # By the boxes themselves: the track may have been another person's.
+        learnt = self._moved(others.pop(person.number, Traits(person.number, None, person.window)), person, variance)
+        mine = replace(learnt, clothes=self._told_apart(learnt.clothes, known.traits.clothes, variance))
+        return replace(known, others=(*others.values(), mine)[-self.remembered :])
 
-    def _told_apart(self, clothes: Clothes | None, traits: Traits) -> Clothes | None:
+    def _told_apart(self, clothes: Clothes | None, own: Clothes | None, variance: float) -> Clothes | None:
         """Return another's clothes, and the person's own in place of a shirt or trousers that do not clearly differ.
 
         What little they differ by is light, the same in every frame, and would soon add up to a proof.
         """
-        own = traits.clothes
         if clothes is None or own is None:
             return clothes
-        same = ((clothes - own) ** 2).sum(axis=1) < self.clear * traits.variance
+        same = ((clothes - own) ** 2).sum(axis=1) < self.clear * variance
         return np.where(same[:, None], own, clothes)
 
-    def _moved(self, traits: Traits, person: Person) -> Traits:
+    def _moved(self, traits: Traits, person: Person, variance: float) -> Traits:
         rate = max(self.rate, 1.0 / (traits.boxes + 1))
-        clothes, window, variance = traits.clothes, traits.window, traits.variance
-        if person.worn is not None and clothes is not None:
-            off = np.minimum((person.worn - clothes) ** 2, self.clear)
-            variance = max(variance + rate * (float(off.mean()) - variance), self.least_variance)
-            clothes = mixed(clothes, person.worn, rate, self.clear)
-        elif person.worn is not None:
-            clothes = person.worn
+        clothes, window = traits.clothes, traits.window
+        if person.worn is not None:
+            most = self.clear * variance
+            clothes = person.worn if clothes is None else mixed(clothes, person.worn, rate, most)
         if person.tall is not None and abs(math.log(person.tall / window)) < self.stature_sigma:
             window += rate * (person.tall - window)
-        return Traits(person.number, clothes, window, traits.boxes + 1, variance)
+        return Traits(person.number, clothes, window, traits.boxes + 1)

@@ -33,6 +33,7 @@ class Tracks:
     stamp: float | None = None
     period: float = 0.1
     recall: Recall = field(default_factory=Recall)  #: How often people are found, as learnt so far.
+    variance: float = 1.0  #: Of the clothes in one person's boxes, times that of `ColourSampling`, as learnt so far.
     #: What may move in the scan, whether the camera shows it or not, and the stamp of that scan [s].
     movers: tuple[Mover, ...] = ()
     moved_at: float = -math.inf
@@ -88,7 +89,10 @@ class Tracker:
         flat = {which for which, seen in enumerate(measured) if not self.existence.is_solid(seen)}
         moving = [one for one in self.movers.moving(tracks.movers) if stamp - one.felt < self.movers.forget_s]
         others = self.movers.others(moving, known, measured, pose, self.noise)
-        pairs = self.association.pair(known, measured, pose, self.noise.turning(pose.angular), flat, others)
+        # A box that does not stand out from what is behind it is no confirmed person's.
+        others |= {(who, which) for who, person in enumerate(known) if person.confirmed for which in flat}
+        noise, variance = self.noise.turning(pose.angular), tracks.variance
+        pairs = self.association.pair(known, measured, pose, noise, others, variance)
         people, boxes, recall = list[Person](), dict[int, int](), tracks.recall
         for who, person in enumerate(known):
             bearing, distance = bearing_range(person.track, pose)
@@ -101,7 +105,10 @@ class Tracker:
                 recall = self.existence.learn(recall, height, found=who in pairs)
             if who in pairs:
                 boxes[person.number] = pairs[who]
-                person = self.correct(person, measured[pairs[who]], pose, chance)
+                clothes = person.clothes
+                person = self.correct(person, measured[pairs[who]], pose, chance, tracks.variance)
+                if person.confirmed and not person.strained and clothes is not None and person.worn is not None:
+                    variance = self.association.appearance.varied(variance, clothes, person.worn)
             elif expected and (not person.confirmed or stamp - person.measured < self.restart_s):
                 # Later than that it shows only that the person walked on, not that there is none. Legs that walk show
                 # that there is one.
@@ -116,7 +123,8 @@ class Tracker:
                 boxes[number] = which
                 number += 1
         found = tuple(boxes.items())
-        return replace(tracks, people=tuple(people), next_number=number, recall=recall, boxes=found), boxes
+        tracks = replace(tracks, people=tuple(people), next_number=number, boxes=found)
+        return replace(tracks, recall=recall, variance=variance), boxes
 
     def begin(self, number: int, seen: Measurement, stamp: float, pose: Odometry) -> Person:
         """Begin to track a box that belongs to no known person."""
@@ -130,8 +138,10 @@ class Tracker:
         worn, tall = self.association.worn(seen), window if seen.whole and seen.window else None
         return Person(number, track, stamp, odds, window, centre, clothes=worn, worn=worn, tall=tall)
 
-    def correct(self, person: Person, seen: Measurement, pose: Odometry, recall: float = 0.9) -> Person:
-        """Update a person, found with `recall`, by their box; the track is at the box's stamp."""
+    def correct(
+        self, person: Person, seen: Measurement, pose: Odometry, recall: float = 0.9, variance: float = 1.0
+    ) -> Person:
+        """Update a person, found with `recall`, by their box, whose clothes have `variance`; both have one stamp."""
         window, centre = person.window, person.centre
         solid, fits = self.existence.is_solid(seen), self.association.fits_size(person, seen)
         if seen.range is not None and solid:
@@ -162,7 +172,7 @@ class Tracker:
         if strained:
             track = kalman.loosened(track, self.association.same_place, self.turn_speed)
             fit = innovation(track, seen.bearing, seen.range, pose, noise)
-        clothes, track = self._clothes(person, worn), kalman.update(track, fit)
+        clothes, track = self._clothes(person, worn, variance), kalman.update(track, fit)
         person = self.existence.update(person, evidence, found=True)
         person = replace(person, seen=track.stamp, track=track, window=window, centre=centre)
         return replace(person, clothes=clothes, worn=worn, tall=tall, strained=strained or not in_place)
@@ -296,10 +306,10 @@ class Tracker:
         period = min(max(period, self.min_period_s), self.max_period_s)
         return replace(tracks, poses=poses, scans=scans, stamp=observation.stamp, period=period)
 
-    def _clothes(self, person: Person, worn: Clothes | None) -> Clothes | None:
+    def _clothes(self, person: Person, worn: Clothes | None, variance: float) -> Clothes | None:
         """Return a person's clothes after one more box: quickly learnt until they are confirmed, then slowly."""
         if person.clothes is None or worn is None:
             return person.clothes if worn is None else worn
         if person.confirmed:
-            return self.association.appearance.learn(person.clothes, worn)
+            return self.association.appearance.learn(person.clothes, worn, variance)
         return person.clothes + self.size_rate * (worn - person.clothes)

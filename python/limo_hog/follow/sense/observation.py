@@ -198,7 +198,7 @@ class Appearance:
     other: float = param(12.0, "chi²", "A larger cost means another person.")
     rate: float = param(0.05, "1", "Share by which a confirmed person's clothes move towards those in a new box.")
 
-    memory: float = param(0.98, "1", "Share of the variance that is kept from box to box.")
+    memory: float = param(0.95, "1", "Share of the variance that is kept from box to box.")
     least: float = param(0.16, "1", "Lower limit of the variance that is believed.")
     odd: float = param(4.0, "1", "The most that a box can show of the variance, times that known: it may be another's.")
 

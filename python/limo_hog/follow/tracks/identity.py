@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 
@@ -88,10 +89,12 @@ class Identity:
         alone = {one.number for one in seen if self._is_alone(one, tracks)}
         chances = self._passed(known, people, tracks, walking)
         odds, before = dict(chances), dict(known.chances)
+        own = known.traits.clothes
+        strangers = [replace(one, clothes=self._told_apart(one.clothes, own, tracks.variance)) for one in known.others]
         for one in seen:
             number = one.number
             stays = before.get(number, 0.0) >= self.stays and number in walking
-            evidence = self._evidence(known, one, tracks.variance, first=one.age <= 1)
+            evidence = self._evidence(known.traits, strangers, one, tracks.variance, first=one.age <= 1)
             odds[number] *= math.exp(self.steady * evidence if stays else evidence)
         total = sum(odds.values()) + max(1.0 - sum(chances.values()), 1e-6)
         chances = {number: value / total for number, value in odds.items()}
@@ -176,12 +179,12 @@ class Identity:
         gaps = [separation(one, person) for one in tracks.people if one is not person and one.measured >= lately]
         return min(gaps, default=math.inf) > self.meets
 
-    def _evidence(self, known: Likeness, person: Person, variance: float, *, first: bool) -> float:
+    def _evidence(
+        self, own: Traits, others: Sequence[Traits], person: Person, variance: float, *, first: bool
+    ) -> float:
         """Return how much more likely a person's last box is on the person followed than on another [log-odds]."""
-        same = self._fit(person, known.traits, variance, first=first)
-        strange = self._fit(person, None, variance, first=first)
-        for traits in known.others:
-            strange = max(strange, self._fit(person, traits, variance, first=first))
+        same = self._fit(person, own, variance, first=first)
+        strange = max(self._fit(person, traits, variance, first=first) for traits in (None, *others))
         return min(max(same - strange, -self.most), self.most)
 
     def _fit(self, person: Person, traits: Traits | None, variance: float, *, first: bool) -> float:
@@ -207,8 +210,7 @@ class Identity:
         others = {traits.number: traits for traits in known.others}
         # By the boxes themselves: the track may have been another person's.
         learnt = self._moved(others.pop(person.number, Traits(person.number, None, person.window)), person, variance)
-        mine = replace(learnt, clothes=self._told_apart(learnt.clothes, known.traits.clothes, variance))
-        return replace(known, others=(*others.values(), mine)[-self.remembered :])
+        return replace(known, others=(*others.values(), learnt)[-self.remembered :])
 
     def _told_apart(self, clothes: Clothes | None, own: Clothes | None, variance: float) -> Clothes | None:
         """Return another's clothes, and the person's own in place of a shirt or trousers that do not clearly differ.

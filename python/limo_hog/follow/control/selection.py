@@ -46,8 +46,8 @@ class Selection:
     min_existence: float = param(0.4, "of 1", "A track too far away for HOG is approached if this probable.", 0, 1)
     # Chosen: 3 s, longer than a person takes to be confirmed who is found in every third frame.
     max_unconfirmed_frames: int = param(30, "frames", "Older tracks neither confirmed nor likely are dropped.", 1, 1000)
-    # Chosen: two full turns of the search.
-    reidentify_s: float = param(20.0, "s", "How long to look for a lost person before another is followed.", 0, 600)
+    # Chosen: as long as the lost person is looked for.
+    reidentify_s: float = param(60.0, "s", "How long to look for a lost person before another is followed.", 0, 600)
     # Chosen: one frame of evidence.
     switch_lead: float = param(0.1, "of 1", "By this another must be likelier than the person faced already.", 0, 1)
     # Chosen: at the image's edge three frames of evidence; two metres are worth two.
@@ -89,6 +89,10 @@ class Selection:
             next_best = chances[rest[0].number] if rest else 0.0
             if chance >= self.min_same and chance >= self.min_same_odds * next_best:
                 return Choice(best.number, likeness, best.measured if chance >= self.identity.sure else choice.measured)
+            # Legs alone do not show who it is, however long they are looked at.
+            about = [one for one in about if now - one.seen <= self.identity.unseen_s]
+        if about:
+            best, *rest = about
             since = now if choice.unsure_at is None else choice.unsure_at
             choice = replace(choice, unsure_at=since)
             if rest and sum(chances[one.number] for one in about) >= self.min_same:

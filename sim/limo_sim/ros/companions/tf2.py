@@ -8,6 +8,7 @@ from typing import Any
 
 from limo_hog.ros2 import names
 from limo_sim.ros.companions.quaternions import IDENTITY, Rigid, rigid_of, slerp
+from limo_sim.ros.companions.tf2_geometry import TRANSFORMS
 from limo_sim.ros.interfaces import Message, message_class
 from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.rclpy_stub.clock import Duration, Time
@@ -120,8 +121,6 @@ class Buffer(PartialApi, missing=_MISSING):
         """Return a PointStamped, PoseStamped or Vector3Stamped in another frame, at its own time."""
         if new_type is not None:
             raise StubError("limo-hog run does not offer Buffer.transform(new_type=...)")
-        from limo_sim.ros.companions.tf2_geometry import TRANSFORMS
-
         carry = TRANSFORMS.get(getattr(object_stamped, "_type_name", ""))
         if carry is None:
             raise StubError(f"limo-hog run does not offer Buffer.transform of a {type(object_stamped).__name__}")

@@ -32,10 +32,7 @@ _BINS = 10
 def write_model(path: Path, coefficients: NDArray[np.float64], shape: WindowShape, card: dict[str, Any]) -> None:
     """Write a detector and its card, whose name is the detector's with `.json` after it.
 
-    Raises
-    ------
-    OSError
-        A file cannot be written; no part of it is left behind.
+    Raises `OSError` where a file cannot be written; no part of it is left behind.
     """
     model_files.save(path, Geometry(winSize=shape.size), coefficients.astype(np.float32))
     write_text(path.with_name(f"{path.name}.json"), json_text(card, indent=2) + "\n")

@@ -227,12 +227,7 @@ class Bus:
     """A node of the ROS 2 network, which others see in `ros2 node list`.
 
     The workshop's topics are in the node's namespace, but for TF and the clock, and have the names that its arguments
-    give them.
-
-    Raises
-    ------
-    BusError
-        If the environment asks for no network that ROS 2 knows, or DDS does not start.
+    give them. Raises `BusError` if the environment asks for no network that ROS 2 knows, or DDS does not start.
     """
 
     def __init__(self, node: NodeNames | None = None) -> None:

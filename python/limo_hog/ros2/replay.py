@@ -42,19 +42,11 @@ def replay(
 ) -> Iterator[Replayed]:
     """Let a follower look at a recording; what it decides moves nothing.
 
-    A frame is worked on when the command that answered it comes, or the next frame; the other sensors' messages up
-    to then are what the follower knows. A detector that raises is a fault of the frame, as on a robot. The topics have
-    the names that they have for `node`; the robot's sensors sit where the transforms say that come before the first
-    image is worked on.
-
-    Raises
-    ------
-    BagError
-        If there are no images on the topic, or no camera info before the first.
-    MessageError
-        If an image or a depth image contradicts itself.
-    RobotError
-        As `Mounts.applied` has it.
+    A frame is worked on when the command that answered it comes, or the next frame; the other sensors' messages up to
+    then are what the follower knows. A detector that raises is a fault of the frame, as on a robot. The topics have the
+    names that they have for `node`; the robot's sensors sit where the transforms say that come before the first image
+    is worked on. Raises `BagError` if there are no images on the topic, or no camera info before the first;
+    `MessageError` if an image or a depth image contradicts itself; `RobotError` as `Mounts.applied` has it.
     """
     follower: Follower[Any] | None = None
     senses, mounts, lidar = Senses(robot), Mounts(), ""

@@ -28,12 +28,8 @@ _CATCH_UP = 0.2
 def run_live(scenario: Scenario, seed: int, seconds: float, bus: Bus | None, watch: Watch | None = None) -> Arena:
     """Run the arena in real time for a duration [s], inf until interrupted, with its topics on the bus.
 
-    Without a bus the arena has no ROS. `watch` is called with every camera frame.
-
-    Raises
-    ------
-    ScenarioError
-        If the scenario asks for faults of the detector: those of the nodes are out of reach.
+    Without a bus the arena has no ROS. `watch` is called with every camera frame. Raises `ScenarioError` if the
+    scenario asks for faults of the detector: those of the nodes are out of reach.
     """
     scenario.check_detector_is_plain("the nodes on the network bring their own detectors")
     arena = Arena(scenario, seed)

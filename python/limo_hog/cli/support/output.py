@@ -29,10 +29,7 @@ class UsageError(LimoHogError):
 def write_json(target: str, value: object) -> None:
     """Write one JSON value, indented, to a file, or to standard output where the target is "-".
 
-    Raises
-    ------
-    ValueError
-        A number in it is not finite, which JSON does not know.
+    Raises `ValueError` where a number in it is not finite, which JSON does not know.
     """
     text = json_text(value, indent=2) + "\n"
     if target == STDOUT:
@@ -45,12 +42,8 @@ def write_json(target: str, value: object) -> None:
 def guarded_outputs(args: Namespace) -> Iterator[None]:
     """Refuse, before the work, what should or can not be written; in this block no other run writes it.
 
-    Raises
-    ------
-    UsageError
-        A file to write is one that is read, is named twice, or is there and is not to be replaced.
-    OSError
-        It cannot be written, or another run writes it.
+    Raises `UsageError` where a file to write is one that is read, is named twice, or is there and is not to be
+    replaced; `OSError` where it cannot be written, or another run writes it.
     """
     read = {os.path.realpath(name) for name in _named(args, _READ) if Path(name).is_file()}
     targets = [Path(name) for name in _named(args, WRITTEN) if name != STDOUT]
@@ -85,10 +78,7 @@ def _named(args: Namespace, names: Iterable[str]) -> list[str]:
 def refuse_to_overwrite(paths: Iterable[Path], resume: str = "") -> None:
     """Refuse to replace what exists; what is written to a pipe, a device or an empty folder replaces nothing.
 
-    Raises
-    ------
-    UsageError
-        One of them exists; `resume` is the hint to the alternative of overwriting.
+    Raises `UsageError` where one of them exists; `resume` is the hint to the alternative of overwriting.
     """
     there = [
         path
@@ -110,10 +100,7 @@ def printable(text: str) -> str:
 def emit(line: str) -> None:
     """Print a line that is all a command is for, at once.
 
-    Raises
-    ------
-    BrokenPipeError
-        Nobody reads standard output any more.
+    Raises `BrokenPipeError` where nobody reads standard output any more.
     """
     print(line, flush=True)
     if getattr(sys.stdout, "lost", False):

@@ -35,10 +35,7 @@ td:first-child,th:first-child{text-align:left}small{color:#66727f}img{max-width:
 def write_report(folder: Path, pictures: Sequence[Picture], evaluations: Sequence[Evaluation]) -> Path:
     """Write `index.html`, `det.png`, `mistakes.png` (of the first detector) and `figures.json`; return the page.
 
-    Raises
-    ------
-    OSError
-        A file cannot be written; no part of it is left behind.
+    Raises `OSError` where a file cannot be written; no part of it is left behind.
     """
     folder.mkdir(parents=True, exist_ok=True)
     _plot(folder / "det.png", evaluations)

@@ -85,12 +85,8 @@ class Buffer(PartialApi, missing=_MISSING):
         """Return the TransformStamped that carries coordinates of `source_frame` to `target_frame`.
 
         `Time()` is the newest time at which all of it is known; `timeout` is how long to wait for it, while another
-        thread or callback group listens.
-
-        Raises
-        ------
-        TransformException
-            If it is not known: `LookupException`, `ConnectivityException` or `ExtrapolationException`.
+        thread or callback group listens. Raises `TransformException` if it is not known: `LookupException`,
+        `ConnectivityException` or `ExtrapolationException`.
         """
         self._wait(target_frame, source_frame, time, timeout)
         rigid, at = self._between(target_frame, source_frame, time)

@@ -41,18 +41,10 @@ def solve(
     tolerance: float = 1e-4,
     most_iterations: int = 400,
 ) -> Solution:
-    """Minimise ½‖w‖² + C Σ max(0, 1 − y f)², f = w · descriptor + bias.
+    """Minimise ½‖w‖² + C Σ max(0, 1 − y f)², f = w · descriptor + bias, over blocks of float32 (n, D) descriptors.
 
-    Parameters
-    ----------
-    positives, negatives
-        Blocks of descriptors, float32 (n, D) each.
-    bias_feature
-        The bias is this times a weight of its own, so that it is hardly held back by ½‖w‖².
-    start
-        Weights and bias to begin with, float64 (D + 1,).
-    tolerance
-        Stop where no element of the gradient is larger.
+    The bias is `bias_feature` times a weight of its own, so that it is hardly held back by ½‖w‖². `start` is weights
+    and bias to begin with, float64 (D + 1,); no element of the gradient is larger than `tolerance` at the end.
     """
     blocks = [
         (part[i : i + _ROWS], y) for parts, y in ((positives, 1.0), (negatives, -1.0)) for part in parts

@@ -128,9 +128,7 @@ def positive_crops(
 ) -> list[NDArray[np.uint8]]:
     """Cut one object out twice, plain and jittered; with `mirror` both ways round, each with a jitter of its own.
 
-    Returns
-    -------
-    Two or four uint8 (height, width), the plain one first.
+    What is returned are two or four uint8 (height, width), the plain one first.
     """
     x, y, width, height = box
     crops = []

@@ -26,11 +26,9 @@ _PARTS = (
 
 
 def street(width: int, height: int, channels: int, *, people: bool = True) -> NDArray[np.uint8]:
-    """Draw a street with people of many sizes, or without; the same picture for the same arguments.
+    """Draw a street with people of many sizes, or without: uint8 (height, width) or (height, width, 3) BGR.
 
-    Returns
-    -------
-    uint8 (height, width) or (height, width, 3) BGR.
+    The same arguments give the same picture.
     """
     rng = np.random.default_rng([width, height])
     ground = np.linspace(200, 120, height, dtype=np.float32)[:, None, None]

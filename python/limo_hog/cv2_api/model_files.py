@@ -222,11 +222,11 @@ def _parse_json(text: str) -> dict[str, Entries]:
     )
     text = re.sub(r"(\d\.)(?=[\s,\]}eE])", r"\g<1>0", text)
     objects = json.loads(text, parse_float=str, parse_int=str, parse_constant=str)
-    return {name: _json_entries(node) for name, node in objects.items() if isinstance(node, dict)}
-
-
-def _json_entries(node: dict[str, Any]) -> Entries:
-    return {key: [str(word) for word in (value if isinstance(value, list) else [value])] for key, value in node.items()}
+    return {
+        name: {key: list(map(str, value if isinstance(value, list) else [value])) for key, value in node.items()}
+        for name, node in objects.items()
+        if isinstance(node, dict)
+    }
 
 
 def _wrapped(start: str, words: Iterable[str], separator: str, indent: int) -> str:

@@ -285,16 +285,13 @@ class Bus:
                 if not alive or not sample.topic_name.startswith(f"{_PREFIX}/"):
                     continue
                 name, qos = sample.topic_name.removeprefix(_PREFIX), sample.qos
-                kinds = (type(qos[policy]).__name__ for policy in (Policy.Reliability, Policy.Durability))
-                one = _ros_type(sample.type_name), ", ".join(kind.rpartition(".")[2] for kind in kinds)
+                qualities = (type(qos[policy]).__name__ for policy in (Policy.Reliability, Policy.Durability))
+                # "geometry_msgs::msg::dds_::Twist_" is ROS's "geometry_msgs/msg/Twist".
+                kind = sample.type_name.replace("::", "/").replace("/dds_/", "/").removesuffix("_")
+                one = kind, ", ".join(quality.rpartition(".")[2] for quality in qualities)
                 ends = found.setdefault(name, Endpoints())
                 (ends.publishers, ends.subscriptions)[index].append(one)
         return dict(sorted(found.items()))
-
-
-def _ros_type(type_name: str) -> str:
-    """Return ROS's name of a type: "geometry_msgs::msg::dds_::Twist_" is "geometry_msgs/msg/Twist"."""
-    return type_name.replace("::", "/").replace("/dds_/", "/").removesuffix("_")
 
 
 @cache

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.pipeline import FrameLog
 from limo_hog.follow.robot import RobotGeometry
+from limo_hog.follow.sense.clearance import to_odometry
 from limo_hog.follow.sense.measurement import box_centre, person_depth, zone_of
-from limo_hog.follow.sense.observation import Scan
+from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.imaging.drawing import annotate
 from limo_hog.suppression import share_inside
 from limo_sim.run.log import Step
@@ -132,5 +133,4 @@ def rollouts(step: Step) -> list[list[list[float]]]:
 def _in_arena(places: NDArray[np.float64], step: Step) -> NDArray[np.float64]:
     """Carry places (..., 2) from the base frame into the arena's [m], to the centimetre."""
     x, y, yaw = step.truth.robot
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    return np.asarray(np.round(places @ np.array([[cos, sin], [-sin, cos]]) + (x, y), 2))
+    return np.asarray(np.round(to_odometry(places, Odometry(x=x, y=y, yaw=yaw)), 2))

@@ -65,7 +65,8 @@ class Buffer(PartialApi, missing=_MISSING):
     def set_transform(self, transform: Any, authority: str) -> None:  # noqa: ARG002 — tf2's signature
         """Take in a TransformStamped."""
         child = self._take(transform)
-        at, track = _nanoseconds(transform.header.stamp), self._moving.setdefault(child, [])
+        stamp, track = transform.header.stamp, self._moving.setdefault(child, [])
+        at = int(stamp.sec * 10**9 + stamp.nanosec)
         self._fixed.pop(child, None)
         index = bisect.bisect_left(track, at, key=lambda entry: entry[0])
         if index < len(track) and track[index][0] == at:
@@ -267,10 +268,6 @@ class StaticTransformBroadcaster:
 
 
 _STATIC = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-
-
-def _nanoseconds(stamp: Any) -> int:
-    return int(stamp.sec * 10**9 + stamp.nanosec)
 
 
 def _rigid(transform: Any) -> Rigid:

@@ -312,8 +312,9 @@ def twist(command: Twist) -> Any:
 
 
 def to_twist(message: Any) -> Twist:
-    """Read a velocity command: a differential drive knows x and yaw alone."""
-    return Twist(float(message.linear.x), float(message.angular.z))
+    """Read a velocity command, with a stamp or without: a differential drive knows x and yaw alone."""
+    command = getattr(message, "twist", message)
+    return Twist(float(command.linear.x), float(command.angular.z))
 
 
 def clock(stamp: float) -> Any:

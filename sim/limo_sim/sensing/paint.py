@@ -83,7 +83,6 @@ class Paint:
         plain = self._texture.kind == "plain" and not self._texture.posters
         doorless = (n for n, side in enumerate(sides) if not any(_on(side, place) for place, _ in self._doors))
         self._bare = set(doorless) if plain else set()
-        self.is_bare = len(self._bare) == len(sides)  #: whether there is nothing on any wall
         self._pictures: dict[int, list[U8]] = {}
 
     @property

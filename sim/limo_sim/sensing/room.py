@@ -89,8 +89,7 @@ class Room:
 
     def decorate(self, image: U8, columns: Columns, camera: CameraPose) -> None:
         """Draw what is on the walls over the room's greys in an image: uint8 (480, 640, 4)."""
-        if not self._paint.is_bare:
-            self._paint.draw(image, columns[1], columns[0], camera)
+        self._paint.draw(image, columns[1], columns[0], camera)
 
     def _make_backdrop(self) -> U8:
         """Sky above, floor below, each a little brighter towards the horizon."""

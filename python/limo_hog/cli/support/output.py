@@ -1,4 +1,4 @@
-"""All that a command prints: streams that outlast their readers, text without control characters, JSON, errors."""
+"""All that a command prints: streams that outlast their readers, safe text, JSON, errors and warnings."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import errno
 import io
 import os
 import sys
+import warnings
 from argparse import Namespace
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout, suppress
@@ -165,3 +166,20 @@ def one_line(error: Exception) -> str:
     if isinstance(error, MemoryError):
         return f"out of memory: {error}"
     return " ".join(str(error).split())
+
+
+@contextmanager
+def warnings_in_one_line() -> Iterator[None]:
+    """Print every warning raised inside as `limo-hog: warning: ...`, once."""
+    shown: set[str] = set()
+
+    def show(message: Warning | str, *_: Any, **__: Any) -> None:
+        line = printable(" ".join(str(message).split()))
+        if line not in shown:
+            shown.add(line)
+            print(f"limo-hog: warning: {line}", file=sys.stderr)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        warnings.showwarning = show
+        yield

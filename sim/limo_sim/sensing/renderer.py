@@ -183,7 +183,7 @@ class Renderer:
                 self._shade_floor(room, depth, camera, (piece.x, piece.y), 0.25)
         if room is not None:
             cv2.cvtColor(room, cv2.COLOR_GRAY2BGRA, dst=self._bytes)
-            self._room.decorate(self._bytes, columns, camera)
+            self._room.painted.draw(self._bytes, columns, camera)
         self._owner.fill(_NO_PERSON)
         seen: list[Seen] = [(0.0, None)] * len(people)
         drawn: list[tuple[int, Window, float]] = []

@@ -223,8 +223,15 @@ class HOGDescriptor:
             if replaced(self, before, after):
                 return
 
-    getDefaultPeopleDetector = staticmethod(functions.HOGDescriptor_getDefaultPeopleDetector)
-    getDaimlerPeopleDetector = staticmethod(functions.HOGDescriptor_getDaimlerPeopleDetector)
+    @staticmethod
+    def getDefaultPeopleDetector() -> NDArray[np.float32]:
+        """float32 (3781,): OpenCV's people detector for the default geometry, bias last."""
+        return functions.HOGDescriptor_getDefaultPeopleDetector()
+
+    @staticmethod
+    def getDaimlerPeopleDetector() -> NDArray[np.float32]:
+        """float32 (1981,): OpenCV's people detector for windows of 48 × 96, bias last."""
+        return functions.HOGDescriptor_getDaimlerPeopleDetector()
 
     def detect(
         self,

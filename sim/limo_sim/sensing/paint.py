@@ -86,11 +86,6 @@ class Paint:
         self._bare = set(doorless) if plain else set()
         self._pictures: dict[int, list[U8]] = {}
 
-    @property
-    def mean_shade(self) -> float:
-        """Mean brightness of a wall's tiles, relative to a plain wall: that of its antialiased rim."""
-        return 1.0 if self._texture.kind == "plain" else 1.0 - self._texture.contrast / 2
-
     def draw(self, image: U8, columns: tuple[NDArray[Any], NDArray[np.int64]], camera: CameraPose) -> None:
         """Draw what is on the walls over them in an image, uint8 (480, 640, 4): blue, green, red, 0.
 

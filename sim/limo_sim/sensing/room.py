@@ -41,7 +41,10 @@ class Room:
         greys = self._make_wall_greys()
         #: What is on the walls, to be drawn over the room's greys.
         self.painted = Paint(scenario, sides_of(scenario.room.half, self._walls, greys))
-        self._wall_greys = [grey * self.painted.mean_shade for grey in greys]
+        texture = scenario.walls_texture
+        # The mean of a wall's tiles: that of its antialiased rim.
+        shade = 1.0 if texture.kind == "plain" else 1.0 - texture.contrast / 2
+        self._wall_greys = [grey * shade for grey in greys]
 
     def cast(self, camera: CameraPose) -> tuple[F32, Columns]:
         """Return the depth of sky, floor and walls, float32 (480, 640) [m], and what each column shows of the walls."""

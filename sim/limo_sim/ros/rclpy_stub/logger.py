@@ -29,6 +29,7 @@ def _speaker(level: LoggingSeverity) -> Callable[..., bool]:
     def speak(logger: Logger, message: object, **options: Any) -> bool:
         return logger._say(level, message, **options)
 
+    speak.__qualname__ = f"Logger.{level.name.lower()}"  # as Python's own errors show it
     return speak
 
 

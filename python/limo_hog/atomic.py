@@ -33,12 +33,7 @@ def is_utf8(name: str) -> bool:
 def part_of(path: Path) -> Path:
     """Return the name that an unfinished file keeps, for a later run to go on from: hidden, beside it, same suffix.
 
-    A pipe or a device is written to under its own name.
-
-    Raises
-    ------
-    IsADirectoryError
-        `path` is a folder.
+    A pipe or a device is written to under its own name. Raises `IsADirectoryError` where `path` is a folder.
     """
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
@@ -68,12 +63,8 @@ def about(path: Path) -> Iterator[None]:
 def whole_file(path: Path) -> Iterator[Path]:
     """Give a name to write to, and rename it to `path` when all went well; else nothing is left behind.
 
-    Folders are made as needed. A pipe or a device stays what it is: the name is its own.
-
-    Raises
-    ------
-    OSError
-        The file cannot be written; it names `path`.
+    Folders are made as needed. A pipe or a device stays what it is: the name is its own. Raises `OSError` where the
+    file cannot be written; it names `path`.
     """
     part = part_of(path)
     if part == path:
@@ -98,12 +89,8 @@ def whole_file(path: Path) -> Iterator[Path]:
 def alone(path: Path) -> Iterator[None]:
     """Keep other runs from writing `path` in this block, by a lock beside it that ends with this process.
 
-    Where the system or the file system has no locks, runs are not kept apart.
-
-    Raises
-    ------
-    BlockingIOError
-        Another run writes it.
+    Where the system or the file system has no locks, runs are not kept apart. Raises `BlockingIOError` where another
+    run writes it.
     """
     if os.name != "posix" or is_stream(path):
         yield
@@ -133,10 +120,7 @@ def alone(path: Path) -> Iterator[None]:
 def json_text(value: object, **options: Any) -> str:
     """Return JSON that every reader takes; `options` are those of `json.dumps`.
 
-    Raises
-    ------
-    ValueError
-        A number is infinite or NaN, which JSON does not know.
+    Raises `ValueError` where a number is infinite or NaN, which JSON does not know.
     """
     return json.dumps(value, allow_nan=False, **options)  # noqa: TID251
 
@@ -144,10 +128,7 @@ def json_text(value: object, **options: Any) -> str:
 def write_text(path: Path, text: str) -> None:
     """Write text as UTF-8; bytes of a file's name that are no UTF-8 are written as they are.
 
-    Raises
-    ------
-    OSError
-        The file cannot be written; it names `path`.
+    Raises `OSError` where the file cannot be written; it names `path`.
     """
     with whole_file(path) as part, about(path):
         part.write_text(text, "utf-8", "surrogateescape")

@@ -53,10 +53,8 @@ def needed(by: str) -> Iterator[None]:
     >>> with needed(by="writing H.264 video"):
     ...     import av
 
-    Raises
-    ------
-    MissingExtraError
-        "writing H.264 video needs PyAV: pip install 'limo-hog[video]'"; or that the library is there and does not load.
+    Raises `MissingExtraError`: "writing H.264 video needs PyAV: pip install 'limo-hog[video]'", or that the library is
+    there and does not load.
     """
     try:
         yield

@@ -24,17 +24,11 @@ IMPATIENT_S = 3.0
 
 
 class Stopped(KeyboardInterrupt):
-    """The command is to stop.
-
-    Attributes
-    ----------
-    signal
-        The signal that said so.
-    """
+    """The command is to stop."""
 
     def __init__(self, signal_: int) -> None:
         super().__init__(f"stopped by signal {signal_}")
-        self.signal = signal_
+        self.signal = signal_  #: the signal that said so
 
 
 class _State:

@@ -166,13 +166,7 @@ class LimoFollowV1(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._observe(), {"time": 0.0}
 
     def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Drive for a tenth of a second.
-
-        Raises
-        ------
-        gymnasium.error.InvalidAction
-            If the action is not two numbers in -1 … 1.
-        """
+        """Drive for .1 s; raises `gymnasium.error.InvalidAction` if the action is not two numbers in -1 … 1."""
         arena = self._running()
         linear, angular = self._checked(action)
         before = arena.contacts

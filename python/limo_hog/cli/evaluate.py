@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from limo_hog.cli.support.arguments import MODEL, add_json, add_labels, least_height, score
-from limo_hog.cli.support.output import STDOUT, write_json
+from limo_hog.cli.support.output import STDOUT, warnings_in_one_line, write_json
 
 if TYPE_CHECKING:
     from limo_hog.learn.evaluation.run import Evaluation, Rival
@@ -47,7 +47,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Measure, print a table and, if asked, write JSON and a page."""
     from limo_hog.cli.support.progress import progress
-    from limo_hog.cli.support.warned import warnings_in_one_line
     from limo_hog.learn.evaluation.run import as_json, evaluate, few
     from limo_hog.learn.formats import read_labels
     from limo_hog.learn.labels import choose

@@ -188,7 +188,3 @@ def _module_of(command: str, arguments: list[str]) -> ModuleType | None:
     if command in ARENA:
         return importlib.import_module(f"limo_sim.cli.{command}")
     return None
-
-
-if __name__ == "__main__":
-    sys.exit(main())

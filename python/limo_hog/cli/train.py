@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from limo_hog.cli.support.arguments import add_labels, count, file_ending, number, seed, size
-from limo_hog.cli.support.output import UsageError
+from limo_hog.cli.support.output import UsageError, warnings_in_one_line
 
 if TYPE_CHECKING:
     from limo_hog.learn.sources import TrainingData
@@ -59,7 +59,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Train, and write the detector and its card after every round."""
     from limo_hog.cli.support.progress import progress
-    from limo_hog.cli.support.warned import warnings_in_one_line
     from limo_hog.learn.sources import Wanted, gather
     from limo_hog.learn.training import TrainingParameters, train
     from limo_hog.parallel import cores

@@ -28,11 +28,7 @@ def pixels(image: Any) -> NDArray[np.uint8]:
     """Return `image` as the uint8 array the detector reads.
 
     Accepts (H, W), (H, W, 1) and (H, W, 3) arrays in any memory layout, 1-D arrays as one column, and `cv2.UMat`.
-
-    Raises
-    ------
-    ImageError
-        It is anything else, or empty.
+    Raises `ImageError` where it is anything else, or empty.
     """
     image = _downloaded(image, ImageTypeError)
     if image is None:
@@ -59,10 +55,7 @@ def pixels(image: Any) -> NDArray[np.uint8]:
 def coefficients(svm: ArrayLike | None) -> NDArray[np.float32] | None:
     """Return the coefficients of an SVM as float32 (n,); None where there are none.
 
-    Raises
-    ------
-    ParameterTypeError
-        They are no numbers of shape (n,), (n, 1) or (1, n).
+    Raises `ParameterTypeError` where they are no numbers of shape (n,), (n, 1) or (1, n).
     """
     svm = _downloaded(svm, ParameterTypeError)
     try:
@@ -149,10 +142,7 @@ def real(name: str, value: SupportsFloat | None, default: float) -> float:
 def number(name: str, value: Any, low: float = -math.inf, high: float = math.inf) -> float:
     """Return a finite number within bounds, both included; a truth value is none.
 
-    Raises
-    ------
-    ParameterError, ParameterTypeError
-        It is out of its bounds, infinite or NaN, or no number.
+    Raises `ParameterError` or `ParameterTypeError` where it is out of its bounds, infinite or NaN, or no number.
     """
     if value is None:
         raise ParameterTypeError(f"{name} is None; a number is wanted")

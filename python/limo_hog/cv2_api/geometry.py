@@ -34,10 +34,8 @@ class Geometry(NamedTuple):
     def compiled(self, svm: NDArray[np.float32] | None) -> _core.Hog:
         """Make the compiled detector, with an SVM or without.
 
-        Raises
-        ------
-        GeometryError, DetectorSizeError
-            The sizes do not fit together, or the SVM has not one coefficient per descriptor element.
+        Raises `GeometryError` or `DetectorSizeError` where the sizes do not fit together, or the SVM has not one
+        coefficient per descriptor element.
         """
         return _core.Hog(
             self.winSize,

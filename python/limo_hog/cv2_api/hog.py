@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from typing import Any, ClassVar, SupportsFloat, SupportsIndex
 
 import numpy as np
@@ -16,6 +17,9 @@ from limo_hog.exceptions import ParameterTypeError
 
 #: Rectangles or places and their weights.
 Found = tuple[NDArray[np.int32], NDArray[np.float64]] | tuple[Nothing, Nothing]
+#: What checks each field of `Geometry`.
+_CHECKS: tuple[Callable[..., Any], ...]
+_CHECKS = (pair, pair, pair, pair, integer, integer, real, integer, real, flag, integer, flag)
 
 
 class HOGDescriptor:
@@ -60,22 +64,11 @@ class HOGDescriptor:
             raise ParameterTypeError(
                 f"HOGDescriptor(...) needs its first five arguments; missing: {', '.join(missing)}"
             )
-        default = Geometry()
-        geometry = Geometry(
-            pair("_winSize", _winSize, default.winSize),
-            pair("_blockSize", _blockSize, default.blockSize),
-            pair("_blockStride", _blockStride, default.blockStride),
-            pair("_cellSize", _cellSize, default.cellSize),
-            integer("_nbins", _nbins, default.nbins),
-            integer("_derivAperture", _derivAperture, default.derivAperture),
-            real("_winSigma", _winSigma, default.winSigma),
-            integer("_histogramNormType", _histogramNormType, default.histogramNormType),
-            real("_L2HysThreshold", _L2HysThreshold, default.L2HysThreshold),
-            flag("_gammaCorrection", _gammaCorrection, bool(missing)),
-            integer("_nlevels", _nlevels, default.nlevels),
-            flag("_signedGradient", _signedGradient, False),
-        )
-        self._state = State(geometry)
+        others = (_derivAperture, _winSigma, _histogramNormType, _L2HysThreshold)
+        given = (*sizes, *others, _gammaCorrection, _nlevels, _signedGradient)
+        default = Geometry(gammaCorrection=bool(missing))
+        each = zip(_CHECKS, Geometry._fields, given, default, strict=True)
+        self._state = State(Geometry(*(check(f"_{name}", value, instead) for check, name, value, instead in each)))
         if filename is not None:
             self.load(filename)
 

@@ -45,17 +45,10 @@ _MARGIN = 71
 def load(filename: str | os.PathLike[str], name: str = "") -> tuple[Geometry, list[float]]:
     """Return geometry and coefficients (perhaps none) of the object `name`, by default of the first in the file.
 
-    As in OpenCV, single numbers that are missing count as 0.
-
-    Raises
-    ------
-    ParameterError
-        The file's name is empty.
-    ModelFileError
-        The file cannot be read; `ModelMissingError` where there is none.
-    ModelFormatError
-        It is not one of OpenCV's files, or has no such object, or that is no HOG detector, or its block is far larger
-        than its coefficients justify.
+    As in OpenCV, single numbers that are missing count as 0. Raises `ParameterError` where the file's name is empty;
+    `ModelFileError` where the file cannot be read; `ModelMissingError` where there is none; `ModelFormatError` where it
+    is not one of OpenCV's files, or has no such object, or that is no HOG detector, or its block is far larger than its
+    coefficients justify.
     """
     path = _path(filename)
     try:
@@ -93,12 +86,8 @@ def _text(path: Path) -> str:
 def save(filename: str | os.PathLike[str], geometry: Geometry, svm: NDArray[np.float32] | None, name: str = "") -> None:
     """Write the object `name` (by default the file's stem) in the format of the suffix; YAML where it is no other.
 
-    Raises
-    ------
-    ParameterError
-        `name` is not a letter or `_` followed by letters, digits, `-` and `_`; or the file's name is empty.
-    OSError
-        The file cannot be written; no part of it is left behind.
+    Raises `ParameterError` where `name` is not a letter or `_` followed by letters, digits, `-` and `_`; or the file's
+    name is empty; `OSError` where the file cannot be written; no part of it is left behind.
     """
     path = _path(filename)
     zipped = path.suffix == ".gz"
@@ -233,11 +222,11 @@ def _parse_json(text: str) -> dict[str, Entries]:
     )
     text = re.sub(r"(\d\.)(?=[\s,\]}eE])", r"\g<1>0", text)
     objects = json.loads(text, parse_float=str, parse_int=str, parse_constant=str)
-    return {name: _json_entries(node) for name, node in objects.items() if isinstance(node, dict)}
-
-
-def _json_entries(node: dict[str, Any]) -> Entries:
-    return {key: [str(word) for word in (value if isinstance(value, list) else [value])] for key, value in node.items()}
+    return {
+        name: {key: list(map(str, value if isinstance(value, list) else [value])) for key, value in node.items()}
+        for name, node in objects.items()
+        if isinstance(node, dict)
+    }
 
 
 def _wrapped(start: str, words: Iterable[str], separator: str, indent: int) -> str:

@@ -25,24 +25,10 @@ def annotate(
     target: int | None = None,
     caption: str = "",
 ) -> NDArray[np.uint8]:
-    """Draw boxes into a copy of an image: green, and the target red with its centre blue.
+    """Draw boxes into a copy of an image, uint8 (height, width, 3) BGR: green, and the target red with its centre blue.
 
-    Parameters
-    ----------
-    image
-        uint8 (height, width, 3) BGR, or (height, width) or (height, width, 1) gray.
-    boxes
-        int32 (N, 4): x, y, w, h [px].
-    labels
-        A text for each of the first boxes, above it.
-    target
-        Index of the followed box; None if there is none.
-    caption
-        A line at the bottom left.
-
-    Returns
-    -------
-    uint8 (height, width, 3) BGR.
+    `image` is uint8 BGR, or (height, width) or (height, width, 1) gray, `boxes` int32 (N, 4): x, y, w, h [px]; `labels`
+    are texts above the first of them, `target` is the index of the followed one, `caption` a line at the bottom left.
     """
     colours = image.reshape(*image.shape[:2], -1)
     canvas = np.repeat(colours, 3, axis=2) if colours.shape[2] == 1 else colours.copy()

@@ -19,22 +19,11 @@ if TYPE_CHECKING:
 
 
 def as_array(image: Any) -> Any:
-    """Return the pixels of a file's name or of a PIL image; anything else as it is.
+    """Return the pixels of a file's name or of a PIL image, uint8 (H, W, 3) BGR or gray (H, W); anything else as it is.
 
-    Files are decoded by OpenCV, or where there is none by Pillow, and turned as their EXIF data say.
-
-    Returns
-    -------
-    uint8 (H, W, 3) BGR; (H, W) for a gray PIL image.
-
-    Raises
-    ------
-    ImageError, ImageTypeError
-        The file is no picture, or the PIL image has no 8 bits a channel.
-    MissingExtraError
-        Neither OpenCV nor Pillow is installed.
-    OSError
-        The file cannot be read.
+    Files are decoded by OpenCV, or where there is none by Pillow, and turned as their EXIF data say. Raises
+    `ImageError` or `ImageTypeError` where the file is no picture, or the PIL image has no 8 bits a channel;
+    `MissingExtraError` where neither OpenCV nor Pillow is installed; `OSError` where the file cannot be read.
     """
     if isinstance(image, (str, os.PathLike)):
         if not os.fspath(image):

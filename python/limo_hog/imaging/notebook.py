@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import html
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,10 +34,14 @@ def shown(caption: str, heads: Sequence[str], rows: Sequence[Sequence[str]], jpe
     left_out = f", the best {ROWS} here" if len(rows) > ROWS else ""
     parts.append(f"<p>{html.escape(caption)}{left_out}</p>")
     if rows:
-        lines = [_line("th", heads), *(_line("td", row) for row in rows[:ROWS])]
-        parts.append(f"<table>{''.join(lines)}</table>")
+        parts.append(table(heads, rows[:ROWS]))
     return f"<div>{''.join(parts)}</div>"
 
 
-def _line(tag: str, cells: Sequence[str]) -> str:
-    return f"<tr>{''.join(f'<{tag}>{html.escape(cell)}</{tag}>' for cell in cells)}</tr>"
+def table(heads: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+    """Return an HTML table; what stands in it is escaped."""
+
+    def line(tag: str, cells: Iterable[object]) -> str:
+        return f"<tr>{''.join(f'<{tag}>{html.escape(str(cell))}</{tag}>' for cell in cells)}</tr>"
+
+    return f"<table>{line('th', heads)}{''.join(line('td', row) for row in rows)}</table>"

@@ -73,10 +73,7 @@ class Source:
 def find_sources(name: str) -> list[Source]:
     """Expand one input; a folder stands for all pictures and videos below it, a glob for what it matches.
 
-    Raises
-    ------
-    ReadError
-        If it stands for nothing.
+    Raises `ReadError` if it stands for nothing.
     """
     if not name:
         raise ReadError("the name of an input is empty; a file, folder, glob, camera or address is wanted")
@@ -128,10 +125,7 @@ def standard_input() -> Iterator[Source]:
 def read_image(source: Source) -> NDArray[np.uint8]:
     """Read an image as uint8 (height, width, 3) BGR, as `cv2.imread` does.
 
-    Raises
-    ------
-    ReadError
-        If the file is no regular one, empty, too large or no image; OSError if it cannot be opened.
+    Raises `ReadError` if the file is no regular one, empty, too large or no image; OSError if it cannot be opened.
     """
     # Opened without waiting: a pipe would wait for its writer.
     flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
@@ -198,10 +192,7 @@ class Video:
     def frames(self, every: int = 1, skip: Container[int] = frozenset()) -> Iterator[tuple[int, NDArray[np.uint8]]]:
         """Yield (number, uint8 (height, width, 3) BGR) of every `every`-th frame not in `skip`.
 
-        Raises
-        ------
-        ReadError
-            At the end, if that comes well before the announced one, or before the first frame.
+        Raises `ReadError` at the end, if that comes well before the announced one, or before the first frame.
         """
         number = 0
         while self._capture.grab():
@@ -222,10 +213,7 @@ class Video:
 def open_video(source: Source) -> Iterator[Video]:
     """Open a video file, a camera, or a stream such as rtsp://… or http://….
 
-    Raises
-    ------
-    ReadError
-        OpenCV cannot read it.
+    Raises `ReadError` where OpenCV cannot read it.
     """
     with ExitStack() as stack:
         if source.kind is Kind.CAMERA:
@@ -263,12 +251,8 @@ def newest_frames(
 ) -> Generator[LiveFrame, None, None]:
     """Yield the newest frame of a camera or a stream; `drop` is called for each that nobody took in time.
 
-    A thread reads it, which owns the open video from now on; `opened` closes that.
-
-    Raises
-    ------
-    ReadError
-        The source never sent a frame, or did not come back.
+    A thread reads it, which owns the open video from now on; `opened` closes that. Raises `ReadError` where the source
+    never sent a frame, or did not come back.
     """
     held: queue.Queue[LiveFrame | BaseException | None] = queue.Queue(1)
     stopped = threading.Event()

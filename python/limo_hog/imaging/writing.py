@@ -34,12 +34,8 @@ class WriteError(LimoHogError):
 def write_image(path: Path, image: NDArray[np.uint8] | NDArray[np.uint16]) -> None:
     """Write uint8 BGR or gray (PNG also uint16) in the format of the path's suffix; folders are made as needed.
 
-    Raises
-    ------
-    WriteError
-        OpenCV knows no such format, or cannot hold the picture in it.
-    OSError
-        The file cannot be written; nothing is left under `path` then.
+    Raises `WriteError` where OpenCV knows no such format, or cannot hold the picture in it; `OSError` where the file
+    cannot be written; nothing is left under `path` then.
     """
     # Level 1 is three times as fast as the default and a tenth larger; other formats complain about it.
     how = [cv2.IMWRITE_PNG_COMPRESSION, 1] if path.suffix.lower() == ".png" else []
@@ -64,14 +60,10 @@ def video_writer(path: Path, fps: float, grows: bool = False) -> Iterator[Callab
 
     A second argument is the frame's time [s], for a film whose rate is not steady; the film begins with the first.
 
-    All frames have the size of the first. H.264 wants even sizes: an odd one gets one more row or column, a
-    copy of the last. The file has its name only after the last frame; an error before leaves nothing behind. One that
-    `grows` has it from the first frame on, and can be read as far as it is written: a killed run loses a second.
-
-    Raises
-    ------
-    WriteError
-        If no frame came.
+    All frames have the size of the first. H.264 wants even sizes: an odd one gets one more row or column, a copy of the
+    last. The file has its name only after the last frame; an error before leaves nothing behind. One that `grows` has
+    it from the first frame on, and can be read as far as it is written: a killed run loses a second. Raises
+    `WriteError` if no frame came.
     """
     with needed(by="writing H.264 video"):
         import av

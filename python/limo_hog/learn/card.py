@@ -32,21 +32,16 @@ _BINS = 10
 def write_model(path: Path, coefficients: NDArray[np.float64], shape: WindowShape, card: dict[str, Any]) -> None:
     """Write a detector and its card, whose name is the detector's with `.json` after it.
 
-    Raises
-    ------
-    OSError
-        A file cannot be written; no part of it is left behind.
+    Raises `OSError` where a file cannot be written; no part of it is left behind.
     """
     model_files.save(path, Geometry(winSize=shape.size), coefficients.astype(np.float32))
     write_text(path.with_name(f"{path.name}.json"), json_text(card, indent=2) + "\n")
 
 
 def measure(done: Round, data: TrainingData, final: bool) -> dict[str, Any]:
-    """Measure a round's detector on the labelled pictures held out.
+    """Measure a round's detector on the labelled pictures held out; return nothing where there are none.
 
-    Returns
-    -------
-    `threshold`, `calibration` and `figures` (LAMR, recall, AP) of a card; nothing where no picture was held out.
+    What is returned are `threshold`, `calibration` and `figures` (LAMR, recall, AP) of a card.
     """
     if not data.validation:
         return {}
@@ -74,15 +69,10 @@ def measure(done: Round, data: TrainingData, final: bool) -> dict[str, Any]:
 
 
 def calibrate(scores: NDArray[np.float64], right: NDArray[np.bool_]) -> Calibration:
-    """Fit P(right | score) = 1 / (1 + exp(−(slope · score + offset))) by maximum likelihood (Platt 1999).
+    """Fit P(right | score) = 1 / (1 + exp(−(slope · score + offset))) to float64 and bool (N,), by maximum likelihood.
 
-    Platt's targets keep the slope finite where scores part right from wrong wholly: (n₊ + 1) / (n₊ + 2) and
+    Platt's targets (1999) keep the slope finite where scores part right from wrong wholly: (n₊ + 1) / (n₊ + 2) and
     1 / (n₋ + 2). Newton's method with halved steps (Lin, Lin and Weng 2007).
-
-    Parameters
-    ----------
-    scores, right
-        float64 and bool (N,).
     """
     count = int(right.sum())
     targets = np.where(right, (count + 1) / (count + 2), 1 / (len(right) - count + 2))

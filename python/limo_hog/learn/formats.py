@@ -32,27 +32,13 @@ _FARTHEST_PX = 1e6
 
 
 def read_labels(source: Path, pictures: Path | None = None) -> list[Picture]:
-    """Read labelled pictures from a label file or a folder of them; the kind is seen from what they hold.
+    """Read labelled pictures, in the labels' order, from a label file or a folder; its kind is seen from what it holds.
 
-    Parameters
-    ----------
-    source
-        VOC: a folder of XML files, or one. YOLO: a folder of pictures with text files beside them, or with the
-        folders `images` and `labels`; `classes.txt` names the labels. COCO, CVAT ("for images") and imglab: the file.
-        `boxes.json`: {picture: [[x, y, w, h], ...]} [px], the file or its folder.
-    pictures
-        The folder of the pictures; by default the labels' own and those usual beside it.
-
-    Returns
-    -------
-    The pictures in the order of the labels, also those without a box.
-
-    Raises
-    ------
-    LabelError
-        These are no such labels, or a picture is missing.
-    OSError
-        A file cannot be read.
+    VOC: a folder of XML files, or one. YOLO: a folder of pictures with text files beside them, or with the folders
+    `images` and `labels`; `classes.txt` names the labels. COCO, CVAT ("for images") and imglab: the file. `boxes.json`:
+    {picture: [[x, y, w, h], ...]} [px], the file or its folder. `pictures` is the folder of the pictures; by default
+    the labels' own and those usual beside it. Raises `LabelError` where these are no such labels, or a picture is
+    missing; `OSError` where a file cannot be read.
     """
     if source.is_dir():
         return _from_folder(source, pictures)

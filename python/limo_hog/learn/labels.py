@@ -50,10 +50,7 @@ class Picture:
     def read(self) -> NDArray[np.uint8]:
         """Read the picture as uint8 (height, width, 3) BGR.
 
-        Raises
-        ------
-        ReadError, OSError
-            The file is no picture, or cannot be read.
+        Raises `ReadError` or `OSError` where the file is no picture, or cannot be read.
         """
         return read_image(Source(str(self.path), self.path, Kind.IMAGE))
 
@@ -61,17 +58,8 @@ class Picture:
 def choose(pictures: Sequence[Picture], label: str | None) -> list[Picture]:
     """Return the pictures with only the boxes of one label, which may be left open where there is just one.
 
-    Boxes without area are left out.
-
-    Raises
-    ------
-    LabelError
-        There is no box, none of this label or only some without area, or several labels to choose from.
-
-    Warns
-    -----
-    LabelWarning
-        Boxes were left out.
+    Boxes without area are left out. Raises `LabelError` where there is no box, none of this label or only some without
+    area, or several labels to choose from. Warns `LabelWarning` where boxes were left out.
     """
     counts = Counter(box.label for picture in pictures for box in picture.boxes if not box.ignored)
     known = ", ".join(f"{name or '(none)'} ({n})" for name, n in counts.most_common())
@@ -101,10 +89,7 @@ def choose(pictures: Sequence[Picture], label: str | None) -> list[Picture]:
 def inside(picture: Picture, size: tuple[int, int]) -> Picture:
     """Return the picture without boxes that lie wholly outside of its width and height [px].
 
-    Warns
-    -----
-    LabelWarning
-        Boxes were left out.
+    Warns `LabelWarning` where boxes were left out.
     """
     width, height = size
     kept = tuple(b for b in picture.boxes if b.x < width and b.y < height and b.x + b.width > 0 and b.y + b.height > 0)

@@ -65,10 +65,7 @@ def describe(hog: _core.Hog, crops: Sequence[NDArray[np.uint8]]) -> NDArray[np.f
 def readable(path: Path) -> NDArray[np.uint8] | None:
     """Read a gray picture; None, with a warning, where it cannot be read.
 
-    Warns
-    -----
-    LabelWarning
-        The file is left out.
+    Warns `LabelWarning` where the file is left out.
     """
     try:
         return read_gray(path)

@@ -21,6 +21,8 @@ with needed(by="limo-hog train"):
 
 #: Descriptors summed at a time: 15 MB of those of 64 × 128 windows, read once for margins and gradient.
 _ROWS = 1024
+#: Steps at the most.
+_STEPS = 400
 
 
 class Solution(NamedTuple):
@@ -39,20 +41,11 @@ def solve(
     start: NDArray[np.float64] | None,
     workers: int,
     tolerance: float = 1e-4,
-    most_iterations: int = 400,
 ) -> Solution:
-    """Minimise ½‖w‖² + C Σ max(0, 1 − y f)², f = w · descriptor + bias.
+    """Minimise ½‖w‖² + C Σ max(0, 1 − y f)², f = w · descriptor + bias, over blocks of float32 (n, D) descriptors.
 
-    Parameters
-    ----------
-    positives, negatives
-        Blocks of descriptors, float32 (n, D) each.
-    bias_feature
-        The bias is this times a weight of its own, so that it is hardly held back by ½‖w‖².
-    start
-        Weights and bias to begin with, float64 (D + 1,).
-    tolerance
-        Stop where no element of the gradient is larger.
+    The bias is `bias_feature` times a weight of its own, so that it is hardly held back by ½‖w‖². `start` is weights
+    and bias to begin with, float64 (D + 1,). It stops where no element of the gradient is larger than `tolerance`.
     """
     blocks = [
         (part[i : i + _ROWS], y) for parts, y in ((positives, 1.0), (negatives, -1.0)) for part in parts
@@ -65,7 +58,7 @@ def solve(
             first,
             jac=True,
             method="L-BFGS-B",
-            options={"maxiter": most_iterations, "maxfun": 2 * most_iterations, "gtol": tolerance, "ftol": 1e-7},
+            options={"maxiter": _STEPS, "maxfun": 2 * _STEPS, "gtol": tolerance, "ftol": 1e-7},
         )
     weights = np.append(found.x[:-1], found.x[-1] * bias_feature)
     return Solution(weights, float(found.fun), int(found.nit))

@@ -61,19 +61,9 @@ class Wanted:
 def gather(wanted: Wanted) -> TrainingData:
     """Read labels, choose the window, and part what is held out.
 
-    Raises
-    ------
-    LabelError
-        There is no object, or no negative, or the labels cannot be read.
-    ReadError
-        A folder holds no picture.
-    OSError
-        A file cannot be read.
-
-    Warns
-    -----
-    LabelWarning
-        A part of the data is left out, or there is little of it.
+    Raises `LabelError` where there is no object, or no negative, or the labels cannot be read; `ReadError` where a
+    folder holds no picture; `OSError` where a file cannot be read. Warns `LabelWarning` where a part of the data is
+    left out, or there is little of it.
     """
     labels = [path for path in wanted.data if holds_labels(path)]
     crops = [path for folder in wanted.data if folder not in labels for path in _pictures(folder)]

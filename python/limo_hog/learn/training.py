@@ -61,12 +61,8 @@ def train(
 ) -> Iterator[Round]:
     """Train, and yield each round as it is done.
 
-    The same data, parameters and seed give the same detector, on any number of `workers`.
-
-    Raises
-    ------
-    LabelError
-        No object or no negative can be read.
+    The same data, parameters and seed give the same detector, on any number of `workers`. Raises `LabelError` where no
+    object or no negative can be read.
     """
     start, threads = time.perf_counter(), _core.get_num_threads()
     # Each worker searches a picture of its own.

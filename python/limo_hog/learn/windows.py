@@ -84,10 +84,7 @@ def positive_regions(pictures: Sequence[Picture], shape: WindowShape) -> list[Re
 def read_gray(path: Path) -> NDArray[np.uint8]:
     """Read a picture as uint8 (height, width).
 
-    Raises
-    ------
-    ReadError, OSError
-        The file is no picture, or cannot be read.
+    Raises `ReadError` or `OSError` where the file is no picture, or cannot be read.
     """
     return cv2.cvtColor(Picture(path, ()).read(), cv2.COLOR_BGR2GRAY).astype(np.uint8, copy=False)
 
@@ -131,9 +128,7 @@ def positive_crops(
 ) -> list[NDArray[np.uint8]]:
     """Cut one object out twice, plain and jittered; with `mirror` both ways round, each with a jitter of its own.
 
-    Returns
-    -------
-    Two or four uint8 (height, width), the plain one first.
+    What is returned are two or four uint8 (height, width), the plain one first.
     """
     x, y, width, height = box
     crops = []

@@ -94,10 +94,7 @@ class NodeNames:
 def parse_ros_arguments(arguments: Sequence[str]) -> RosArguments:
     """Read `-p name:=value`, `-r from:=to` and `--params-file FILE` after each --ros-args; values are YAML, as in ROS.
 
-    Raises
-    ------
-    RosArgumentError
-        If one of them is malformed, or a file is missing.
+    Raises `RosArgumentError` if one of them is malformed, or a file is missing.
     """
     parsed = RosArguments()
     words = iter(arguments)

@@ -60,10 +60,7 @@ class Record(NamedTuple):
 def to_detections(message: Any) -> Detections:
     """Read a Detection2DArray; it holds the boxes around people alone, so these are the windows, too.
 
-    Raises
-    ------
-    BagError
-        If a box has no score.
+    Raises `BagError` if a box has no score.
     """
     if not all(one.results for one in message.detections):
         raise BagError(f"a {DETECTIONS_TYPE} has a box without a hypothesis: its score is missing")
@@ -111,12 +108,8 @@ def bag_writer(path: Path) -> Iterator[Callable[[str, float, Any], None]]:
 def read_bag(path: Path) -> Iterator[Record]:
     """Read a ROS 2 recording in the order it was written: an MCAP file, or a rosbag2 folder.
 
-    Raises
-    ------
-    BagError
-        If it is none, or damaged or cut off: what was whole before that has been given by then.
-    OSError
-        If it cannot be read.
+    Raises `BagError` if it is none, or damaged or cut off: what was whole before that has been given by then; `OSError`
+    if it cannot be read.
     """
     if not path.exists():
         raise BagError(f"{path}: no such recording")

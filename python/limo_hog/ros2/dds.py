@@ -227,12 +227,7 @@ class Bus:
     """A node of the ROS 2 network, which others see in `ros2 node list`.
 
     The workshop's topics are in the node's namespace, but for TF and the clock, and have the names that its arguments
-    give them.
-
-    Raises
-    ------
-    BusError
-        If the environment asks for no network that ROS 2 knows, or DDS does not start.
+    give them. Raises `BusError` if the environment asks for no network that ROS 2 knows, or DDS does not start.
     """
 
     def __init__(self, node: NodeNames | None = None) -> None:
@@ -290,16 +285,13 @@ class Bus:
                 if not alive or not sample.topic_name.startswith(f"{_PREFIX}/"):
                     continue
                 name, qos = sample.topic_name.removeprefix(_PREFIX), sample.qos
-                kinds = (type(qos[policy]).__name__ for policy in (Policy.Reliability, Policy.Durability))
-                one = _ros_type(sample.type_name), ", ".join(kind.rpartition(".")[2] for kind in kinds)
+                qualities = (type(qos[policy]).__name__ for policy in (Policy.Reliability, Policy.Durability))
+                # "geometry_msgs::msg::dds_::Twist_" is ROS's "geometry_msgs/msg/Twist".
+                kind = sample.type_name.replace("::", "/").replace("/dds_/", "/").removesuffix("_")
+                one = kind, ", ".join(quality.rpartition(".")[2] for quality in qualities)
                 ends = found.setdefault(name, Endpoints())
                 (ends.publishers, ends.subscriptions)[index].append(one)
         return dict(sorted(found.items()))
-
-
-def _ros_type(type_name: str) -> str:
-    """Return ROS's name of a type: "geometry_msgs::msg::dds_::Twist_" is "geometry_msgs/msg/Twist"."""
-    return type_name.replace("::", "/").replace("/dds_/", "/").removesuffix("_")
 
 
 @cache

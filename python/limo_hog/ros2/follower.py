@@ -56,12 +56,7 @@ class Report:
 def camera_topic(bus: Bus, *, compressed: bool = False) -> str:
     """Wait for a camera; returns the topic of its raw images or, without these, of its compressed ones.
 
-    With `compressed` it waits for compressed images alone.
-
-    Raises
-    ------
-    BusError
-        If no camera is found within 10 s.
+    With `compressed` it waits for compressed images alone. Raises `BusError` if no camera is found within 10 s.
     """
     wanted = (names.IMAGE_COMPRESSED,) if compressed else (names.IMAGE, names.IMAGE_COMPRESSED)
     here = [names.resolved(bus.node, topic) for topic in wanted]
@@ -134,12 +129,8 @@ class Inputs:
 def mounted(bus: Bus, inputs: Inputs, camera: str, robot: RobotGeometry) -> tuple[RobotGeometry, str]:
     """Return the robot with its sensors where /tf_static has them, and a line: where they sit, and who says so.
 
-    Waits some seconds for the frames, where somebody publishes some; `camera` is the topic of its images.
-
-    Raises
-    ------
-    RobotError
-        /tf_static has a sensor where none of this robot can be.
+    Waits some seconds for the frames, where somebody publishes some; `camera` is the topic of its images. Raises
+    `RobotError` where /tf_static has a sensor where none of this robot can be.
     """
     mounts, framed, file = Mounts(), frozenset[str](), robot
     static = names.resolved(bus.node, names.TF_STATIC)
@@ -177,14 +168,8 @@ def drive(
 ) -> Report:
     """Follow the person the camera sees until the time is up; the last command is always to stand.
 
-    A `report` that is given is kept up to date, for a drive that is interrupted.
-
-    Raises
-    ------
-    BusError
-        If there is no camera, or no image comes for 10 s.
-    RobotError
-        As `mounted` has it.
+    A `report` that is given is kept up to date, for a drive that is interrupted. Raises `BusError` if there is no
+    camera, or no image comes for 10 s; `RobotError` as `mounted` has it.
     """
     report = Report() if report is None else report
     camera = camera_topic(bus, compressed=settings.compressed)

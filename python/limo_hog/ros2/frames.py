@@ -81,12 +81,8 @@ class Mounts:
     def applied(self, robot: RobotGeometry, base: str, camera: str, lidar: str) -> tuple[RobotGeometry, frozenset[str]]:
         """Return a robot whose sensors sit where their frames do, and the names of the numbers that the frames have.
 
-        What the robot's file says, and is not the Limo's, stays.
-
-        Raises
-        ------
-        RobotError
-            A sensor is not level, or where it sits is out of range.
+        What the robot's file says, and is not the Limo's, stays. Raises `RobotError` where a sensor is not level, or
+        where it sits is out of range.
         """
         looks, scans = self.pose(base, camera), self.pose(base, lidar)
         found: dict[str, float] = {}

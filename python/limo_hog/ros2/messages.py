@@ -75,13 +75,7 @@ def serialize(message: Any) -> bytes:
 
 
 def deserialize(data: bytes | memoryview, type_name: str) -> Any:
-    """Read a message from its CDR bytes.
-
-    Raises
-    ------
-    MessageError
-        The bytes are no such message.
-    """
+    """Read a message from its CDR bytes; raises `MessageError` where the bytes are no such message."""
     try:
         return typestore().deserialize_cdr(data, type_name)
     except Exception as error:  # rosbags raises whatever struct, numpy or its own checks raise
@@ -168,10 +162,7 @@ def stamped(type_name: str, stamp: float, frame: str) -> Any:
 def image(stamp: float, pixels: NDArray[Any], frame: str = CAMERA_FRAME) -> Any:
     """Return an image: uint8 (H, W, 3) is bgr8, uint8 (H, W) mono8, uint16 (H, W) 16UC1 [mm], float32 (H, W) 32FC1 [m].
 
-    Raises
-    ------
-    MessageError
-        The array is none of these.
+    Raises `MessageError` where the array is none of these.
     """
     kinds = {("uint8", 3): "bgr8", ("uint8", 2): "mono8", ("uint16", 2): "16UC1", ("float32", 2): "32FC1"}
     encoding = kinds.get((pixels.dtype.name, pixels.ndim))
@@ -191,10 +182,7 @@ def image(stamp: float, pixels: NDArray[Any], frame: str = CAMERA_FRAME) -> Any:
 def pixels_of(message: Any) -> NDArray[Any]:
     """Return an Image's pixels as its encoding says: (H, W) or (H, W, channels), a view where that can be.
 
-    Raises
-    ------
-    MessageError
-        The encoding is unknown, or `step` or `data` do not fit the size.
+    Raises `MessageError` where the encoding is unknown, or `step` or `data` do not fit the size.
     """
     if message.encoding not in ENCODINGS:
         raise MessageError(f"image encoding {message.encoding!r} is not read; known are {', '.join(ENCODINGS)}")
@@ -226,10 +214,7 @@ def compressed_image(stamp: float, pixels: NDArray[np.uint8]) -> Any:
 def decompressed(message: Any) -> NDArray[np.uint8]:
     """Return a CompressedImage's pixels, uint8 (H, W, 3) BGR or (H, W) gray; needs OpenCV.
 
-    Raises
-    ------
-    MessageError
-        The data are no JPEG or PNG, or one of more than `MOST_PIXELS`.
+    Raises `MessageError` where the data are no JPEG or PNG, or one of more than `MOST_PIXELS`.
     """
     with needed(by="a compressed image"):
         import cv2
@@ -327,8 +312,9 @@ def twist(command: Twist) -> Any:
 
 
 def to_twist(message: Any) -> Twist:
-    """Read a velocity command: a differential drive knows x and yaw alone."""
-    return Twist(float(message.linear.x), float(message.angular.z))
+    """Read a velocity command, with a stamp or without: a differential drive knows x and yaw alone."""
+    command = getattr(message, "twist", message)
+    return Twist(float(command.linear.x), float(command.angular.z))
 
 
 def clock(stamp: float) -> Any:

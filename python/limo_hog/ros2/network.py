@@ -34,10 +34,7 @@ class Network:
 def network(environment: Mapping[str, str]) -> Network:
     """Read the environment as ROS 2 Jazzy and Humble do.
 
-    Raises
-    ------
-    BusError
-        If ROS_DOMAIN_ID is no domain, or a variable has a value that ROS 2 does not know.
+    Raises `BusError` if ROS_DOMAIN_ID is no domain, or a variable has a value that ROS 2 does not know.
     """
     text = environment.get("ROS_DOMAIN_ID", "").strip() or "0"
     if not text.isdecimal() or int(text) > 232:

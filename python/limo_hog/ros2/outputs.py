@@ -23,13 +23,7 @@ FRAMES = {"base_frame": messages.BASE_FRAME, "camera_frame": messages.CAMERA_FRA
 
 
 def frame_named(node: NodeNames, parameter: str) -> str:
-    """Return a frame by its parameter.
-
-    Raises
-    ------
-    BusError
-        If the parameter is no text.
-    """
+    """Return a frame by its parameter; raises `BusError` if the parameter is no text."""
     frame = node.parameters.get(parameter, FRAMES[parameter])
     if not isinstance(frame, str) or not frame:
         raise BusError(f"parameter {parameter} is {frame!r}; wanted is a frame's name such as {FRAMES[parameter]}")

@@ -18,6 +18,8 @@ from limo_hog.ros2.frames import Mounts
 from limo_hog.ros2.outputs import frame_named
 from limo_hog.ros2.senses import DEPTH_ENCODINGS, Senses, picture_of
 
+#: Types of the commands that drive a robot.
+_COMMANDS = (names.TYPES[names.COMMAND], names.STAMPED_COMMAND_TYPE)
 #: Sensors beside the camera's images.
 SENSED = (names.CAMERA_INFO, names.DEPTH, names.DEPTH_LCAS, names.SCAN, names.ODOMETRY)
 
@@ -42,19 +44,11 @@ def replay(
 ) -> Iterator[Replayed]:
     """Let a follower look at a recording; what it decides moves nothing.
 
-    A frame is worked on when the command that answered it comes, or the next frame; the other sensors' messages up
-    to then are what the follower knows. A detector that raises is a fault of the frame, as on a robot. The topics have
-    the names that they have for `node`; the robot's sensors sit where the transforms say that come before the first
-    image is worked on.
-
-    Raises
-    ------
-    BagError
-        If there are no images on the topic, or no camera info before the first.
-    MessageError
-        If an image or a depth image contradicts itself.
-    RobotError
-        As `Mounts.applied` has it.
+    A frame is worked on when the command that answered it comes, or the next frame; the other sensors' messages up to
+    then are what the follower knows. A detector that raises is a fault of the frame, as on a robot. The topics have the
+    names that they have for `node`; the robot's sensors sit where the transforms say that come before the first image
+    is worked on. Raises `BagError` if there are no images on the topic, or no camera info before the first;
+    `MessageError` if an image or a depth image contradicts itself; `RobotError` as `Mounts.applied` has it.
     """
     follower: Follower[Any] | None = None
     senses, mounts, lidar = Senses(robot), Mounts(), ""
@@ -85,7 +79,8 @@ def replay(
         is_image = name == names.IMAGE or (
             name == names.IMAGE_COMPRESSED and names.resolved(node, names.IMAGE) not in topics
         )
-        command = _command(message) if name == names.COMMAND else None
+        drives = name == names.COMMAND and message.__msgtype__ in _COMMANDS
+        command = messages.to_twist(message) if drives else None
         if waiting is not None and (is_image or command is not None):
             yield work(time, command)
             waiting = recorded = None
@@ -128,12 +123,3 @@ def elsewhere(kinds: Mapping[str, str], node: NodeNames) -> list[str]:
             rule = f"--ros-args -r {topic.lstrip('/')}:={others[0]}"
             told.append(f"not used, since it is not on {known[0]}: {', '.join(others)} ({wanted}); give {rule}")
     return told
-
-
-def _command(message: Any) -> Twist | None:
-    """Return the command that drives the robot, of either type; None of any other message."""
-    if message.__msgtype__ == names.TYPES[names.COMMAND]:
-        return messages.to_twist(message)
-    if message.__msgtype__ == names.STAMPED_COMMAND_TYPE:
-        return messages.to_twist(message.twist)
-    return None

@@ -43,10 +43,7 @@ class Senses:
     def take(self, message: Any) -> None:
         """Take in a CameraInfo, LaserScan, Odometry or depth Image; other types are left alone.
 
-        Raises
-        ------
-        MessageError
-            The message contradicts itself, or an Image is not a depth image.
+        Raises `MessageError` where the message contradicts itself, or an Image is not a depth image.
         """
         kind = messages.type_of(message)
         if kind == "sensor_msgs/msg/CameraInfo":
@@ -114,10 +111,7 @@ def stamp_of(message: Any) -> float:
 def picture_of(message: Any) -> NDArray[np.uint8]:
     """Return the pixels of a camera's Image or CompressedImage, uint8 (H, W, 3) BGR; gray is given three channels.
 
-    Raises
-    ------
-    MessageError
-        The message contradicts itself, or its encoding is none of a camera's.
+    Raises `MessageError` where the message contradicts itself, or its encoding is none of a camera's.
     """
     if messages.type_of(message) == "sensor_msgs/msg/CompressedImage":
         pixels: NDArray[Any] = messages.decompressed(message)

@@ -60,10 +60,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--scenario", nargs="+", metavar="NAME|FILE.toml", help="only these (all that come along)")
     which.add_argument("--suite", metavar="v1", help="the frozen scenarios of a benchmark, summed up by group")
-    add, named = (
-        parser.add_argument,
-        "of approach, proxemic, tracking, pursuit, ppo and policy:FILE.npz (the first three)",
-    )
+    add = parser.add_argument
+    named = "of approach, proxemic, tracking, pursuit, ppo and policy:FILE.npz (the first three)"
     add("--controller", nargs="+", type=_controller, metavar="NAME", default=CONTROLLERS, help=f"only these, {named}")
     arguments.add_robot(parser)
     add("--against", metavar="NAME", help="compare the others with this controller, run by run")

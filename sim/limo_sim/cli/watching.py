@@ -122,9 +122,11 @@ def observing(
 
                 observers.plot = args.plot
             if args.video is not None:
-                from limo_sim.view.video import filmed
+                from limo_hog.imaging.writing import video_writer
+                from limo_sim.view.reading import annotated
 
-                observers.keepers.append(stack.enter_context(filmed(args.video, scenario.camera.rate_hz)))
+                film = stack.enter_context(video_writer(args.video, scenario.camera.rate_hz))
+                observers.keepers.append(lambda step: film(annotated(step.log)) if step.log.frame else None)
             if args.record is not None:
                 from limo_sim.view.record import recorded
 

@@ -47,10 +47,7 @@ def default(field: Field) -> Any:
 def checked(field: Field, value: Any) -> Any:
     """Return a value as a field stores it.
 
-    Raises
-    ------
-    AssertionError
-        As rclpy does, if the value is of another type or out of range.
+    Raises `AssertionError` as rclpy does, if the value is of another type or out of range.
     """
     if field.length is None:
         _check_item(field, value)

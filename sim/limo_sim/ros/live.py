@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from limo_hog.ros2.dds import Bus, Subscription
     from limo_sim.ros.outlet import Outlet
 
-_STAMPED = names.STAMPED_COMMAND_TYPE
 #: After a delay the arena runs faster until this much is made up for [s]; more is dropped. Chosen: two camera frames.
 _CATCH_UP = 0.2
 
@@ -28,12 +27,8 @@ _CATCH_UP = 0.2
 def run_live(scenario: Scenario, seed: int, seconds: float, bus: Bus | None, watch: Watch | None = None) -> Arena:
     """Run the arena in real time for a duration [s], inf until interrupted, with its topics on the bus.
 
-    Without a bus the arena has no ROS. `watch` is called with every camera frame.
-
-    Raises
-    ------
-    ScenarioError
-        If the scenario asks for faults of the detector: those of the nodes are out of reach.
+    Without a bus the arena has no ROS. `watch` is called with every camera frame. Raises `ScenarioError` if the
+    scenario asks for faults of the detector: those of the nodes are out of reach.
     """
     scenario.check_detector_is_plain("the nodes on the network bring their own detectors")
     arena = Arena(scenario, seed)
@@ -49,7 +44,9 @@ def run_live(scenario: Scenario, seed: int, seconds: float, bus: Bus | None, wat
         writers = {
             topic: bus.publisher(topic, names.TYPES[topic], kept=topic == names.TF_STATIC) for topic in PUBLISHED
         }
-        commands = [bus.subscription(names.COMMAND, kind) for kind in (names.TYPES[names.COMMAND], _STAMPED)]
+        commands = [
+            bus.subscription(names.COMMAND, kind) for kind in (names.TYPES[names.COMMAND], names.STAMPED_COMMAND_TYPE)
+        ]
     twist, shown = Twist(), -1.0
     passed: list[Passed] = []
     began = time.monotonic()
@@ -58,7 +55,7 @@ def run_live(scenario: Scenario, seed: int, seconds: float, bus: Bus | None, wat
         if watch is not None:
             passed.append(now)
         for message in [message for reader in commands for message in reader.take()]:
-            twist = to_twist(message.twist if message.__msgtype__ == _STAMPED else message)
+            twist = to_twist(message)
             arena.command(twist)
         for topic, make in outlet.new(now) if outlet is not None else ():
             if writers[topic].has_readers or topic == names.TF_STATIC:

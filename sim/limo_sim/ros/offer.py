@@ -6,7 +6,7 @@ import contextlib
 from typing import Any
 
 from limo_sim.ros import interfaces
-from limo_sim.ros.companions import bridge, camera_model, filters, packages, quaternions, tf2, tf2_geometry
+from limo_sim.ros.companions import bridge, camera_model, filters, quaternions, tf2, tf2_geometry
 from limo_sim.ros.lockstep import turns
 from limo_sim.ros.rclpy_stub import (
     clock,
@@ -87,7 +87,7 @@ def _rclpy() -> dict[str, dict[str, Any]]:
 
 
 def _companions() -> dict[str, dict[str, Any]]:
-    share = {"get_package_share_directory": packages.share_directory}
+    share = {"get_package_share_directory": _share_directory}
     geometry = {name: interfaces.message_class(f"geometry_msgs/msg/{name}") for name in _STAMPED.split()}
     return {
         "message_filters": _of(filters, "SimpleFilter Subscriber TimeSynchronizer ApproximateTimeSynchronizer"),
@@ -111,6 +111,17 @@ _TF2_ROS = (
 )
 _TRANSFORMS = "do_transform_point do_transform_pose do_transform_pose_stamped do_transform_vector3"
 _STAMPED = "PointStamped PoseStamped Vector3Stamped"
+
+
+def _share_directory(package_name: str) -> str:
+    """Return the package's folder around the script; the script's own folder where none has that name."""
+    here = default_context().world.script.resolve().parent
+    for folder in (here, *here.parents[:3]):
+        for candidate in (folder, folder / package_name, folder / "src" / package_name):
+            # (The Python package in a package has its name, too.)
+            if candidate.name == package_name and candidate.is_dir() and not (candidate / "__init__.py").exists():
+                return str(candidate)
+    return str(here)
 
 
 def _init(

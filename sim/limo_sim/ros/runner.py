@@ -69,11 +69,7 @@ def run_node(
 
     Of the arguments, what follows --ros-args is ROS's. `said` is given what the node prints. With `checked` the stage's
     witness is shown what detectors are given; limo-hog's HOG then stands in for OpenCV's: the same boxes in less time.
-
-    Raises
-    ------
-    StubError
-        If there is no such script.
+    Raises `StubError` if there is no such script.
     """
     if not stage.script.is_file():
         raise StubError(f"{stage.script}: no such file")

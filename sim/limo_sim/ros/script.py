@@ -75,11 +75,8 @@ def _script_traceback(error: BaseException) -> str:
     told = traceback.TracebackException.from_exception(error)
     link: traceback.TracebackException | None = told
     while link is not None:
-        frames = [frame for frame in link.stack if not _ours(frame.filename)]
+        theirs = (frame for frame in link.stack if not frame.filename.startswith(("<frozen", str(_HERE))))
+        frames = [frame for frame in theirs if Path(frame.filename).name != "runpy.py"]
         link.stack = traceback.StackSummary.from_list(frames)
         link = link.__cause__ or link.__context__
     return "".join(told.format())
-
-
-def _ours(filename: str) -> bool:
-    return filename.startswith(("<frozen", str(_HERE))) or Path(filename).name == "runpy.py"

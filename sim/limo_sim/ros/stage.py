@@ -66,10 +66,7 @@ class Witness:
 class Stage:
     """One run: the arena, and the log that is scored.
 
-    Raises
-    ------
-    ScenarioError
-        If the scenario asks for faults of the detector, which is the node's own here.
+    Raises `ScenarioError` if the scenario asks for faults of the detector, which is the node's own here.
     """
 
     def __init__(
@@ -125,10 +122,7 @@ class Stage:
     def tell(self, told: str, *content: Any, data: bytes = b"") -> None:
         """Take what the script does.
 
-        Raises
-        ------
-        ValueError, TypeError, KeyError
-            If it is nothing that a script can do.
+        Raises `ValueError`, `TypeError` or `KeyError` if it is nothing that a script can do.
         """
         self._told += 1
         if self._told > _MOST_TOLD:

@@ -141,10 +141,7 @@ def _waiting() -> Worker | None:
 def ready() -> Iterator[Worker]:
     """Give a process that has imported what nodes need; it is kept for the next node unless it has ended.
 
-    Raises
-    ------
-    StubError
-        Inside of `no_nodes`.
+    Raises `StubError` inside of `no_nodes`.
     """
     worker = _waiting() or Worker()
     busy.append(worker)

@@ -72,10 +72,7 @@ class Plan:
 class Arena:
     """One run of a scenario, whose `vary` draws people from the seed: `scenario` holds those of this run.
 
-    Raises
-    ------
-    ScenarioError
-        When the scenario cannot be run.
+    Raises `ScenarioError` when the scenario cannot be run.
     """
 
     def __init__(self, scenario: Scenario, seed: int = 0) -> None:

@@ -33,12 +33,8 @@ _FORGET_S = 5.0
 def controller_of(name: str, target: float | None = None) -> Controller[Any]:
     """Return a controller by its name, with another distance to hold [m] where one is given.
 
-    The name is one of `limo_hog.follow.control.naming.CONTROLLERS` or `BASELINES`, or "policy:FILE.npz".
-
-    Raises
-    ------
-    ControllerError
-        There is no such controller, it holds no distance, or the file is no policy.
+    The name is one of `limo_hog.follow.control.naming.CONTROLLERS` or `BASELINES`, or "policy:FILE.npz". Raises
+    `ControllerError` where there is no such controller, it holds no distance, or the file is no policy.
     """
     if name in CONTROLLERS:
         return controller_named(name, target)
@@ -89,12 +85,7 @@ class PurePursuit:
 class Policy:
     """A network that was learnt in `LimoFollow-v1` from the observation "state".
 
-    The state is the last sighting.
-
-    Raises
-    ------
-    ControllerError
-        The file cannot be read, or is no such network.
+    The state is the last sighting. Raises `ControllerError` where the file cannot be read, or is no such network.
     """
 
     #: An .npz file with the arrays `w0`, `b0`, `w1`, `b1`, …: float32 weights (inputs, outputs) and biases of layers

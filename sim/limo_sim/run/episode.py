@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from limo_hog.detections import Detector
@@ -14,40 +14,14 @@ from limo_hog.follow.sense.observation import Sensors
 from limo_sim.run.arena import Arena
 from limo_sim.run.detector_faults import FaultySearch
 from limo_sim.run.log import Passed, Step, Watch
+from limo_sim.run.score import Episode as Episode
 from limo_sim.run.score import ScoreCard, Scorer
 from limo_sim.world.scenario import DetectorFaults, Scenario
-from limo_sim.world.truth import Contacts
-
-
-@dataclass(frozen=True, slots=True)
-class Episode:
-    """A run that has ended."""
-
-    #: scenario, controller, detector, seed: what was run; the controller and the detector by name.
-    scenario: Scenario
-    controller: str
-    detector: str
-    seed: int
-    seconds: float  #: simulated time [s]
-    scorer: Scorer  #: has measured every control period
-    contacts: Contacts
-    wall_seconds: float  #: how long the run took [s]
-    #: Distance that the controller held at the end, from the camera to the person's surface [m]; None where it holds
-    #: none.
-    target_distance: float | None = None
 
 
 def score(episode: Episode) -> ScoreCard:
     """Return the score card of a run."""
-    return episode.scorer.card(
-        controller=episode.controller,
-        detector=episode.detector,
-        seed=episode.seed,
-        seconds=episode.seconds,
-        contacts=episode.contacts,
-        wall_seconds=episode.wall_seconds,
-        target_distance=episode.target_distance,
-    )
+    return episode.scorer.card(episode)
 
 
 def run_episode(

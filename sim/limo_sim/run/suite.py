@@ -48,10 +48,7 @@ class Suite:
     def load(name: str) -> Suite:
         """Read a suite, and check that its files are those that were frozen.
 
-        Raises
-        ------
-        ScenarioError
-            There is no such suite, or one of its files is another than when it was frozen.
+        Raises `ScenarioError` where there is no such suite, or one of its files is another than when it was frozen.
         """
         if name not in Suite.names():
             raise ScenarioError(f"unknown suite {name}: want one of {', '.join(Suite.names())}")

@@ -115,12 +115,8 @@ class WorkerError(LimoHogError):
 def in_processes(task: Callable[[R], C], runs: Sequence[R], workers: int) -> Iterator[tuple[R, C]]:
     """Do a task for each run on `workers` processes; yields each run with the answer, in the order in which they end.
 
-    The processes end with this one, whatever ends it, and at once where the caller takes no more.
-
-    Raises
-    ------
-    WorkerError
-        A process was killed, after the cards of all runs that have ended.
+    The processes end with this one, whatever ends it, and at once where the caller takes no more. Raises `WorkerError`
+    where a process was killed, after the cards of all runs that have ended.
     """
     # Fresh processes: threads of the detector do not survive a fork.
     context = get_context("spawn")

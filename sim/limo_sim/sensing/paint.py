@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,19 +84,14 @@ class Paint:
         plain = self._texture.kind == "plain" and not self._texture.posters
         doorless = (n for n, side in enumerate(sides) if not any(_on(side, place) for place, _ in self._doors))
         self._bare = set(doorless) if plain else set()
-        self.is_bare = len(self._bare) == len(sides)  #: whether there is nothing on any wall
         self._pictures: dict[int, list[U8]] = {}
 
-    @property
-    def mean_shade(self) -> float:
-        """Mean brightness of a wall's tiles, relative to a plain wall: that of its antialiased rim."""
-        return 1.0 if self._texture.kind == "plain" else 1.0 - self._texture.contrast / 2
-
-    def draw(self, image: U8, faces: NDArray[np.int64], depth: NDArray[np.float32], camera: CameraPose) -> None:
+    def draw(self, image: U8, columns: tuple[NDArray[Any], NDArray[np.int64]], camera: CameraPose) -> None:
         """Draw what is on the walls over them in an image, uint8 (480, 640, 4): blue, green, red, 0.
 
-        `faces` and `depth`, (640,), are which side the camera sees in each column, and how far away it is [m].
+        `columns`, (640,) each, are how far away the side is that the camera sees in each column [m], and which it is.
         """
+        depth, faces = columns
         edges = [0, *(np.flatnonzero(np.diff(faces)) + 1).tolist(), WIDTH]
         for first, end in pairwise(edges):
             number = int(faces[first])

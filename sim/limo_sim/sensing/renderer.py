@@ -29,7 +29,6 @@ from limo_sim.sensing.solids import (
     Outline,
     Sun,
     Window,
-    cast_body,
     cast_box,
     cast_frustum,
     covers,
@@ -184,7 +183,7 @@ class Renderer:
                 self._shade_floor(room, depth, camera, (piece.x, piece.y), 0.25)
         if room is not None:
             cv2.cvtColor(room, cv2.COLOR_GRAY2BGRA, dst=self._bytes)
-            self._room.decorate(self._bytes, columns, camera)
+            self._room.painted.draw(self._bytes, columns, camera)
         self._owner.fill(_NO_PERSON)
         seen: list[Seen] = [(0.0, None)] * len(people)
         drawn: list[tuple[int, Window, float]] = []
@@ -194,7 +193,8 @@ class Renderer:
                 self._draw_furniture(image, depth, camera, thing, sun, hides=bool(drawn))
             elif window := _window(outlines[thing].bounds):
                 self._canvas.begin(window)
-                cast_body(self._canvas, outlines[thing], sun)
+                self._canvas.strips(outlines[thing].strips, sun.light)
+                self._canvas.ellipses(outlines[thing].ellipses, sun.light)
                 inside = self._canvas.draw(image, depth, self._palettes[thing], self._owner, thing)
                 area = _area_outside(outlines[thing], window) + inside
                 drawn.append((thing, window, area))

@@ -39,8 +39,12 @@ class Room:
         self._backdrop = self._make_backdrop()
         self._walls = [wall.footprint for wall in scenario.walls]
         greys = self._make_wall_greys()
-        self._paint = Paint(scenario, sides_of(scenario.room.half, self._walls, greys))
-        self._wall_greys = [grey * self._paint.mean_shade for grey in greys]
+        #: What is on the walls, to be drawn over the room's greys.
+        self.painted = Paint(scenario, sides_of(scenario.room.half, self._walls, greys))
+        texture = scenario.walls_texture
+        # The mean of a wall's tiles: that of its antialiased rim.
+        shade = 1.0 if texture.kind == "plain" else 1.0 - texture.contrast / 2
+        self._wall_greys = [grey * shade for grey in greys]
 
     def cast(self, camera: CameraPose) -> tuple[F32, Columns]:
         """Return the depth of sky, floor and walls, float32 (480, 640) [m], and what each column shows of the walls."""
@@ -86,11 +90,6 @@ class Room:
             grey = self._wall_greys[int(faces[start])]
             cv2.fillConvexPoly(room, quad, grey, cv2.LINE_AA, shift=4)
         return room
-
-    def decorate(self, image: U8, columns: Columns, camera: CameraPose) -> None:
-        """Draw what is on the walls over the room's greys in an image: uint8 (480, 640, 4)."""
-        if not self._paint.is_bare:
-            self._paint.draw(image, columns[1], columns[0], camera)
 
     def _make_backdrop(self) -> U8:
         """Sky above, floor below, each a little brighter towards the horizon."""

@@ -113,12 +113,6 @@ def outline(body: BodyMesh, camera: CameraPose) -> Outline | None:
     return Outline(strips[strip_ok], ellipses[ellipse_ok], bounds)
 
 
-def cast_body(canvas: Canvas, shape: Outline, sun: Sun) -> None:
-    """Cast a body; `sun` in the camera's frame."""
-    canvas.strips(shape.strips, sun.light)
-    canvas.ellipses(shape.ellipses, sun.light)
-
-
 def covers(shape: Outline, x: F32, y: F32) -> NDArray[np.bool_]:
     """Whether pixels at float32 (N,) columns `x` and rows `y`, in the image or not, belong to a body."""
     inside = np.zeros(len(x), np.bool_)

@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.pipeline import FrameLog
 from limo_hog.follow.robot import RobotGeometry
+from limo_hog.follow.sense.clearance import to_odometry
 from limo_hog.follow.sense.measurement import box_centre, person_depth, zone_of
-from limo_hog.follow.sense.observation import Scan
+from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.imaging.drawing import annotate
+from limo_hog.suppression import share_inside
 from limo_sim.run.log import Step
 from limo_sim.sensing.camera import WIDTH
 
@@ -48,16 +50,11 @@ def followed_person(step: Step) -> int | None:
     log = step.log
     if log.decision.target is None or step.seen is None:
         return None
-    x, y, w, h = log.detections.windows[log.decision.target].tolist()
-    shared = {}
-    for index, person in enumerate(step.seen.people):
-        if person is not None and person.box is not None:
-            left, top, width, height = person.box
-            wide = min(x + w, left + width) - max(x, left)
-            high = min(y + h, top + height) - max(y, top)
-            if wide > 0 and high > 0:
-                shared[index] = wide * high * person.visible
-    return max(shared, key=shared.__getitem__, default=None)
+    people = [(0.0, (0, 0, 0, 0)) if p is None or p.box is None else (p.visible, p.box) for p in step.seen.people]
+    outlines = np.array([box for _, box in people]).reshape(-1, 4)
+    (shares,) = share_inside(log.detections.windows[[log.decision.target]], outlines)
+    shown = shares * [visible for visible, _ in people]
+    return max(np.flatnonzero(shares).tolist(), key=shown.__getitem__, default=None)
 
 
 def annotated(log: FrameLog, caption: bool = True) -> NDArray[np.uint8]:
@@ -136,5 +133,4 @@ def rollouts(step: Step) -> list[list[list[float]]]:
 def _in_arena(places: NDArray[np.float64], step: Step) -> NDArray[np.float64]:
     """Carry places (..., 2) from the base frame into the arena's [m], to the centimetre."""
     x, y, yaw = step.truth.robot
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    return np.asarray(np.round(places @ np.array([[cos, sin], [-sin, cos]]) + (x, y), 2))
+    return np.asarray(np.round(to_odometry(places, Odometry(x=x, y=y, yaw=yaw)), 2))

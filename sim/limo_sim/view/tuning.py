@@ -56,10 +56,7 @@ class Tunable(Generic[S]):
     def set(self, name: str, value: Any) -> None:
         """Give a parameter a value.
 
-        Raises
-        ------
-        ParameterError
-            There is no such parameter, or the value is not a number within its bounds.
+        Raises `ParameterError` where there is no such parameter, or the value is not a number within its bounds.
         """
         parameters = self.parameters
         if name not in parameters:

@@ -96,10 +96,7 @@ def names() -> list[str]:
 def exercise(name_or_path: str) -> Exercise:
     """Read one of `names()`, or a TOML file. A scene or checkpoint that it only names is one of `common.toml`.
 
-    Raises
-    ------
-    ScenarioError
-        With the file, the key and what is allowed there.
+    Raises `ScenarioError` with the file, the key and what is allowed there.
     """
     path = Path(name_or_path) if name_or_path.endswith(".toml") else _FOLDER / f"{name_or_path}.toml"
     if path.parent == _FOLDER and path.stem not in names():
@@ -153,10 +150,7 @@ def _table(path: Path) -> dict[str, Any]:
 def scene_named(name: str) -> Scene:
     """Return a scene by `NAME` of tasks 1 to 4, or by `EXERCISE/NAME`.
 
-    Raises
-    ------
-    ScenarioError
-        If there is no such scene.
+    Raises `ScenarioError` if there is no such scene.
     """
     of, _, scene = name.rpartition("/")
     there = {one.name: one for one in exercise(of or "follower").scenes}

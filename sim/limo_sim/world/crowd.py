@@ -77,11 +77,6 @@ class Walker:
         self._phase = self._swinging = 0.0
 
     @property
-    def feels_walls(self) -> bool:
-        """Whether the room's outer walls repel the person: not in their doors."""
-        return self.stage in (_INSIDE, _LEAVING)
-
-    @property
     def pose(self) -> Pose | None:
         """Where the person is now; None where that is not in the arena."""
         if self.stage in (_AWAY, _GONE):
@@ -284,7 +279,7 @@ class Crowd:
         count, half = len(walkers), self._scenario.room.half
         position = people.position[:count]
         walls = np.zeros((count, 4, 2))
-        feels = [walker.feels_walls for walker in walkers]
+        feels = [walker.stage in (_INSIDE, _LEAVING) for walker in walkers]  # not in the walls' doors
         for side, (axis, sign) in enumerate(((0, 1), (0, -1), (1, 1), (1, -1))):
             walls[:, side, axis] = np.where(feels, position[:, axis] - sign * half, np.inf)
         # Movers and the robot count as discs: before the flat side of a box, left as good as right, people would stop.

@@ -250,10 +250,7 @@ class Scenario:
     def load(name_or_path: str | Path, robot: str | Path | None = None) -> Scenario:
         """Read one of `Scenario.names()`, or a TOML file; `robot` is the file of another than the Limo.
 
-        Raises
-        ------
-        ScenarioError, RobotError
-            With the file, the key and what is allowed there.
+        Raises `ScenarioError` or `RobotError` with the file, the key and what is allowed there.
         """
         path = Path(name_or_path)
         if path.suffix != ".toml":

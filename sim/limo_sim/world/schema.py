@@ -89,10 +89,7 @@ def check_fields(value: Any, where: str) -> None:
 def build(kind: type[T], table: Any, where: str) -> T:
     """Make a dataclass from a parsed TOML table; ranges are left to `check_fields`.
 
-    Raises
-    ------
-    ScenarioError
-        For an unknown or missing key or a value of the wrong type; `where` begins the message.
+    Raises `ScenarioError` for an unknown or missing key or a value of the wrong type; `where` begins the message.
     """
     if not isinstance(table, Mapping):
         raise ScenarioError(f"{where.rstrip('.')}: got {table!r}, want a table")

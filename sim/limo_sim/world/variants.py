@@ -27,12 +27,8 @@ _TRIES = 200  # chosen
 def of_run(scenario: Scenario, seed: int) -> Scenario:
     """Return a scenario with the people of the run with `seed`, as its `vary` asks for; itself where that is off.
 
-    In what is returned `vary` is off: the people are drawn.
-
-    Raises
-    ------
-    ScenarioError
-        No people that fit into the room were found.
+    In what is returned `vary` is off: the people are drawn. Raises `ScenarioError` where no people that fit into the
+    room were found.
     """
     if scenario.vary == Vary():
         return scenario

@@ -28,7 +28,7 @@ pytestmark = needs_rclpy
 ROOT = Path(__file__).parents[3]
 NODES = ROOT / "tests" / "ros2" / "rclpy_nodes"
 PATH = os.pathsep.join([str(ROOT / "python"), str(ROOT / "sim"), sysconfig.get_path("purelib")])
-COMMAND = [sys.executable, "-m", "limo_hog.cli.main"]
+COMMAND = [sys.executable, "-m", "limo_hog"]
 
 #: The arena's rates [Hz]; a machine that is busy draws fewer images.
 RATES = {names.IMAGE: 10, names.CAMERA_INFO: 10, names.SCAN: 8, names.ODOMETRY: 50, names.IMU: 100, names.CLOCK: 50}

@@ -130,7 +130,7 @@ def test_a_watcher_that_fails_ends_the_node(run: Run) -> None:
 
 def test_ctrl_c_ends_run_and_node_and_leaves_no_process(script: Callable[[str], Path]) -> None:
     path = script(node("import os; print('pid', os.getpid(), flush=True); " + DRIVE))
-    command = [sys.executable, "-m", "limo_hog.cli.main", "run", str(path), "--seconds", "3600", "--view", "0"]
+    command = [sys.executable, "-m", "limo_hog", "run", str(path), "--seconds", "3600", "--view", "0"]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as run:

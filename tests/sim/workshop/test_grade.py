@@ -71,7 +71,7 @@ def test_no_student_is_run_among_the_files_of_another(tmp_path: Path) -> None:
 def test_a_signal_to_grade_keeps_the_rows_that_are_done_and_ends_the_nodes(tmp_path: Path) -> None:
     folder = written(tmp_path / "class", amy="raise ValueError\n", bob=LOOP, eve=LOOP)
     table, unfinished = tmp_path / "points.csv", tmp_path / ".points.part.csv"
-    command = [sys.executable, "-m", "limo_hog.cli.main", "workshop", "grade", str(folder), "--csv", str(table)]
+    command = [sys.executable, "-m", "limo_hog", "workshop", "grade", str(folder), "--csv", str(table)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True) as run:
         until = time.monotonic() + 60
         while not (unfinished.is_file() and "amy.py" in unfinished.read_text()) and time.monotonic() < until:

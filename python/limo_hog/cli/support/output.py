@@ -1,4 +1,4 @@
-"""All that a command prints: streams that outlast their readers, text without control characters, JSON, errors."""
+"""All that a command prints: streams that outlast their readers, safe text, JSON, errors and warnings."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import errno
 import io
 import os
 import sys
+import warnings
 from argparse import Namespace
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout, suppress
@@ -29,10 +30,7 @@ class UsageError(LimoHogError):
 def write_json(target: str, value: object) -> None:
     """Write one JSON value, indented, to a file, or to standard output where the target is "-".
 
-    Raises
-    ------
-    ValueError
-        A number in it is not finite, which JSON does not know.
+    Raises `ValueError` where a number in it is not finite, which JSON does not know.
     """
     text = json_text(value, indent=2) + "\n"
     if target == STDOUT:
@@ -45,12 +43,8 @@ def write_json(target: str, value: object) -> None:
 def guarded_outputs(args: Namespace) -> Iterator[None]:
     """Refuse, before the work, what should or can not be written; in this block no other run writes it.
 
-    Raises
-    ------
-    UsageError
-        A file to write is one that is read, is named twice, or is there and is not to be replaced.
-    OSError
-        It cannot be written, or another run writes it.
+    Raises `UsageError` where a file to write is one that is read, is named twice, or is there and is not to be
+    replaced; `OSError` where it cannot be written, or another run writes it.
     """
     read = {os.path.realpath(name) for name in _named(args, _READ) if Path(name).is_file()}
     targets = [Path(name) for name in _named(args, WRITTEN) if name != STDOUT]
@@ -85,10 +79,7 @@ def _named(args: Namespace, names: Iterable[str]) -> list[str]:
 def refuse_to_overwrite(paths: Iterable[Path], resume: str = "") -> None:
     """Refuse to replace what exists; what is written to a pipe, a device or an empty folder replaces nothing.
 
-    Raises
-    ------
-    UsageError
-        One of them exists; `resume` is the hint to the alternative of overwriting.
+    Raises `UsageError` where one of them exists; `resume` is the hint to the alternative of overwriting.
     """
     there = [
         path
@@ -110,10 +101,7 @@ def printable(text: str) -> str:
 def emit(line: str) -> None:
     """Print a line that is all a command is for, at once.
 
-    Raises
-    ------
-    BrokenPipeError
-        Nobody reads standard output any more.
+    Raises `BrokenPipeError` where nobody reads standard output any more.
     """
     print(line, flush=True)
     if getattr(sys.stdout, "lost", False):
@@ -178,3 +166,20 @@ def one_line(error: Exception) -> str:
     if isinstance(error, MemoryError):
         return f"out of memory: {error}"
     return " ".join(str(error).split())
+
+
+@contextmanager
+def warnings_in_one_line() -> Iterator[None]:
+    """Print every warning raised inside as `limo-hog: warning: ...`, once."""
+    shown: set[str] = set()
+
+    def show(message: Warning | str, *_: Any, **__: Any) -> None:
+        line = printable(" ".join(str(message).split()))
+        if line not in shown:
+            shown.add(line)
+            print(f"limo-hog: warning: {line}", file=sys.stderr)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        warnings.showwarning = show
+        yield

@@ -26,12 +26,7 @@ _PARTS = (
 
 
 def street(width: int, height: int, channels: int, *, people: bool = True) -> NDArray[np.uint8]:
-    """Draw a street with people of many sizes, or without; the same picture for the same arguments.
-
-    Returns
-    -------
-    uint8 (height, width) or (height, width, 3) BGR.
-    """
+    """Draw the street of these arguments, with people of many sizes or without: uint8 (height, width[, 3]), BGR."""
     rng = np.random.default_rng([width, height])
     ground = np.linspace(200, 120, height, dtype=np.float32)[:, None, None]
     canvas = np.broadcast_to(ground, (height, width, 3)) + rng.normal(0, 6, 3).astype(np.float32)

@@ -34,17 +34,10 @@ class Match(NamedTuple):
 def match(
     found: NDArray[np.float64], boxes: NDArray[np.float64], ignored: NDArray[np.bool_], min_iou: float = 0.5
 ) -> Match:
-    """Pair detections with labelled boxes, the surest detection first.
+    """Pair detections, float64 (D, 4) x, y, w, h [px], best first, with labelled boxes, (N, 4), some of them ignored.
 
     A detection takes the box it overlaps most (IoU) of those still free, if that is `min_iou` or more. What is left
-    over and lies, by `min_iou` of its own area or more, in an ignored box does not count.
-
-    Parameters
-    ----------
-    found
-        float64 (D, 4) x, y, w, h [px], best first.
-    boxes, ignored
-        float64 (N, 4) and bool (N,).
+    over and lies, by `min_iou` of its own area or more, in an ignored box, bool (N,), does not count.
     """
     iou = intersection_over_union(found, boxes)
     within = share_inside(found, boxes)
@@ -82,12 +75,8 @@ def collect(
 ) -> tuple[Outcomes, list[Match]]:
     """Match every picture's detections and put them together.
 
-    Parameters
-    ----------
-    found
-        Of each picture: boxes float64 (D, 4), scores float64 (D,), best first.
-    labelled
-        Of each picture: boxes float64 (N, 4), ignored bool (N,).
+    Of each picture `found` has boxes float64 (D, 4) and scores (D,), best first, `labelled` boxes float64 (N, 4) and
+    which are ignored, bool (N,).
     """
     matches = []
     scores, right, picture, found_at = [], [], [], []

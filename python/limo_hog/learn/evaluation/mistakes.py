@@ -49,12 +49,7 @@ def worst_mistakes(evaluation: Evaluation, pictures: Sequence[Picture]) -> list[
 
 
 def draw_sheet(mistakes: Sequence[Mistake]) -> NDArray[np.uint8]:
-    """Draw mistakes on one sheet: false alarms with their score, then missed people with their height.
-
-    Returns
-    -------
-    uint8 (height, width, 3) BGR.
-    """
+    """Draw mistakes on a sheet, uint8 (height, width, 3) BGR: false alarms with their score, missed people's height."""
     width, height = _TILE
     rows = max(1, -(-len(mistakes) // _COLUMNS))
     sheet = np.full((rows * height, _COLUMNS * width, 3), 255, np.uint8)

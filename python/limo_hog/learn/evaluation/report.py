@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from limo_hog.atomic import about, json_text, whole_file, write_text
 from limo_hog.extras import needed
+from limo_hog.imaging.notebook import table
 from limo_hog.imaging.writing import write_image
 from limo_hog.learn.evaluation.mistakes import draw_sheet, worst_mistakes
 from limo_hog.learn.evaluation.run import CONFIDENCE, DRAWS, MIN_IOU, Evaluation, as_json, compare, few
@@ -35,10 +36,7 @@ td:first-child,th:first-child{text-align:left}small{color:#66727f}img{max-width:
 def write_report(folder: Path, pictures: Sequence[Picture], evaluations: Sequence[Evaluation]) -> Path:
     """Write `index.html`, `det.png`, `mistakes.png` (of the first detector) and `figures.json`; return the page.
 
-    Raises
-    ------
-    OSError
-        A file cannot be written; no part of it is left behind.
+    Raises `OSError` where a file cannot be written; no part of it is left behind.
     """
     folder.mkdir(parents=True, exist_ok=True)
     _plot(folder / "det.png", evaluations)
@@ -93,7 +91,7 @@ def _page(pictures: int, objects: int, evaluations: Sequence[Evaluation], mistak
         f'<meta name="viewport" content="width=device-width"><title>{html.escape(title)}</title>',
         f"<style>{_STYLE}</style><h1>{html.escape(title)}</h1>",
         '<img src="det.png" alt="Miss rate over false positives per image">',
-        _table(("model", "LAMR", *recalls, "AP", "threshold at 0.1 FPPI", "ms a picture"), rows),
+        table(("model", "LAMR", *recalls, "AP", "threshold at 0.1 FPPI", "ms a picture"), rows),
         "<p><small>LAMR: log-average miss rate over 10⁻²…10⁰ false positives per image (FPPI), lower is better. "
         f"A box is found from an IoU of {MIN_IOU:g} on. Intervals: {CONFIDENCE:.0%} of {DRAWS} draws of the pictures."
         "</small></p>",
@@ -103,10 +101,10 @@ def _page(pictures: int, objects: int, evaluations: Sequence[Evaluation], mistak
     if differences:
         parts += [
             "<h2>Differences, paired</h2>",
-            _table(("models", "figure", "difference", "interval"), differences),
+            table(("models", "figure", "difference", "interval"), differences),
             "<p><small>If the interval excludes 0, the difference is unlikely to be chance.</small></p>",
         ]
-    parts += ["<h2>By height</h2>", _table(("objects", "how many", *recalls), heights)]
+    parts += ["<h2>By height</h2>", table(("objects", "how many", *recalls), heights)]
     if mistakes:
         alt = "False alarms in orange with their score and a blue centre, missed people in green with their height"
         parts += [f"<h2>The worst mistakes of {html.escape(evaluations[0].name)}</h2>", f"<p><small>{alt}</small></p>"]
@@ -125,10 +123,3 @@ def _interval(ends: tuple[float, float], form: str) -> str:
 
 def _range(low: float, high: float) -> str:
     return f"{low:g}–{high:g} px" if np.isfinite(high) else f"from {low:g} px"
-
-
-def _table(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
-    def line(cells: Iterable[object], tag: str) -> str:
-        return "<tr>" + "".join(f"<{tag}>{html.escape(str(cell))}</{tag}>" for cell in cells) + "</tr>"
-
-    return "\n".join(["<table>", line(head, "th"), *(line(row, "td") for row in rows), "</table>"])

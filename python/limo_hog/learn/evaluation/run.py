@@ -92,19 +92,9 @@ def evaluate(
 ) -> tuple[list[Picture], list[Evaluation]]:
     """Run every detector on every picture and return the pictures as used, and each detector's figures.
 
-    Parameters
-    ----------
-    draws
-        Sets of pictures for an interval.
-    done
-        Called after each picture.
-
-    Raises
-    ------
-    LabelError
-        No labelled box lies in its picture.
-    ReadError, OSError
-        A picture cannot be read: figures over the rest would be those of another set.
+    An interval is of so many `draws` of the pictures; `done` is called after each picture. Raises `LabelError` where no
+    labelled box lies in its picture; `ReadError` or `OSError` where a picture cannot be read: figures over the rest
+    would be those of another set.
     """
     used: list[Picture] = []
     found: list[list[tuple[NDArray[np.float64], NDArray[np.float64]]]] = [[] for _ in rivals]

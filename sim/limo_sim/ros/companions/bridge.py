@@ -31,10 +31,7 @@ class CvBridge:
     def imgmsg_to_cv2(self, img_msg: Any, desired_encoding: str = "passthrough") -> NDArray[Any]:
         """Return an Image's pixels, (H, W) or (H, W, channels), the caller's own.
 
-        Raises
-        ------
-        CvBridgeError
-            If the message is inconsistent or its encoding cannot become the desired one.
+        Raises `CvBridgeError` if the message is inconsistent or its encoding cannot become the desired one.
         """
         pixels = _read(pixels_of, img_msg, "sensor_msgs/msg/Image").copy()
         return _converted(pixels, img_msg.encoding, desired_encoding)

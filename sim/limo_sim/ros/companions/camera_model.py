@@ -6,7 +6,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from limo_sim.ros.rclpy_stub.partial import PartialApi
 
@@ -47,21 +46,11 @@ class PinholeCameraModel(PartialApi, missing=_MISSING):
         x, y, z = ray / np.linalg.norm(ray)
         return float(x), float(y), float(z)
 
-    def intrinsicMatrix(self) -> NDArray[np.float64]:  # noqa: N802
-        """Return K."""
-        return self.K  # type: ignore[no-any-return]
-
-    def projectionMatrix(self) -> NDArray[np.float64]:  # noqa: N802
-        """Return P."""
-        return self.P  # type: ignore[no-any-return]
-
-    def distortionCoeffs(self) -> NDArray[np.float64]:  # noqa: N802
-        """Return D."""
-        return self.D  # type: ignore[no-any-return]
-
-    def rotationMatrix(self) -> NDArray[np.float64]:  # noqa: N802
-        """Return R."""
-        return self.R  # type: ignore[no-any-return]
+    # Humble's names and Jazzy's
+    intrinsicMatrix = intrinsic_matrix = lambda model: model.K  # noqa: N815
+    projectionMatrix = projection_matrix = lambda model: model.P  # noqa: N815
+    distortionCoeffs = distortion_coeffs = lambda model: model.D  # noqa: N815
+    rotationMatrix = rotation_matrix = lambda model: model.R  # noqa: N815
 
     def tfFrame(self) -> str:  # noqa: N802
         """Return the camera's frame."""
@@ -95,7 +84,3 @@ class PinholeCameraModel(PartialApi, missing=_MISSING):
     from_camera_info = fromCameraInfo
     project_3d_to_pixel = project3dToPixel
     project_pixel_to_3d_ray = projectPixelTo3dRay
-    intrinsic_matrix = intrinsicMatrix
-    projection_matrix = projectionMatrix
-    distortion_coeffs = distortionCoeffs
-    rotation_matrix = rotationMatrix

@@ -27,7 +27,7 @@ class Rigid(NamedTuple):
 
     def inverse(self) -> Rigid:
         """Return the transform back."""
-        back = conjugate(self.rotation)
+        back = self.rotation * _BACK
         return Rigid(-rotate(back, self.translation), back)
 
 
@@ -38,6 +38,8 @@ def rigid_of(stamped: Any) -> Rigid:
 
 
 IDENTITY = Rigid(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
+#: Times this a quaternion of length 1 is the rotation back.
+_BACK = np.array([-1.0, -1.0, -1.0, 1.0])
 
 
 def multiply(a: Vector, b: Vector) -> Vector:
@@ -53,14 +55,9 @@ def multiply(a: Vector, b: Vector) -> Vector:
     )
 
 
-def conjugate(q: Vector) -> Vector:
-    """Return the rotation back, of a quaternion of length 1."""
-    return np.array([-q[0], -q[1], -q[2], q[3]])
-
-
 def rotate(q: Vector, point: Vector) -> Vector:
     """Rotate a point, (3,)."""
-    return multiply(multiply(q, np.append(point, 0.0)), conjugate(q))[:3]
+    return multiply(multiply(q, np.append(point, 0.0)), q * _BACK)[:3]
 
 
 def slerp(a: Vector, b: Vector, share: float) -> Vector:

@@ -8,6 +8,7 @@ from typing import Any
 
 from limo_hog.ros2 import names
 from limo_sim.ros.companions.quaternions import IDENTITY, Rigid, rigid_of, slerp
+from limo_sim.ros.companions.tf2_geometry import TRANSFORMS
 from limo_sim.ros.interfaces import Message, message_class
 from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.rclpy_stub.clock import Duration, Time
@@ -64,7 +65,8 @@ class Buffer(PartialApi, missing=_MISSING):
     def set_transform(self, transform: Any, authority: str) -> None:  # noqa: ARG002 — tf2's signature
         """Take in a TransformStamped."""
         child = self._take(transform)
-        at, track = _nanoseconds(transform.header.stamp), self._moving.setdefault(child, [])
+        stamp, track = transform.header.stamp, self._moving.setdefault(child, [])
+        at = int(stamp.sec * 10**9 + stamp.nanosec)
         self._fixed.pop(child, None)
         index = bisect.bisect_left(track, at, key=lambda entry: entry[0])
         if index < len(track) and track[index][0] == at:
@@ -84,12 +86,8 @@ class Buffer(PartialApi, missing=_MISSING):
         """Return the TransformStamped that carries coordinates of `source_frame` to `target_frame`.
 
         `Time()` is the newest time at which all of it is known; `timeout` is how long to wait for it, while another
-        thread or callback group listens.
-
-        Raises
-        ------
-        TransformException
-            If it is not known: `LookupException`, `ConnectivityException` or `ExtrapolationException`.
+        thread or callback group listens. Raises `TransformException` if it is not known: `LookupException`,
+        `ConnectivityException` or `ExtrapolationException`.
         """
         self._wait(target_frame, source_frame, time, timeout)
         rigid, at = self._between(target_frame, source_frame, time)
@@ -120,8 +118,6 @@ class Buffer(PartialApi, missing=_MISSING):
         """Return a PointStamped, PoseStamped or Vector3Stamped in another frame, at its own time."""
         if new_type is not None:
             raise StubError("limo-hog run does not offer Buffer.transform(new_type=...)")
-        from limo_sim.ros.companions.tf2_geometry import TRANSFORMS
-
         carry = TRANSFORMS.get(getattr(object_stamped, "_type_name", ""))
         if carry is None:
             raise StubError(f"limo-hog run does not offer Buffer.transform of a {type(object_stamped).__name__}")
@@ -272,10 +268,6 @@ class StaticTransformBroadcaster:
 
 
 _STATIC = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-
-
-def _nanoseconds(stamp: Any) -> int:
-    return int(stamp.sec * 10**9 + stamp.nanosec)
 
 
 def _rigid(transform: Any) -> Rigid:

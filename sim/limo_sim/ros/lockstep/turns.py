@@ -98,12 +98,8 @@ class Turns:
     def wait(self, ready: Callable[[], bool], until: float = math.inf, wakes: Callable[[], float] = at_once) -> bool:
         """Give the turn away until `ready()` holds or simulated time reaches `until` [s]; returns `ready()`.
 
-        Before the time `wakes()` [s], `ready()` changes by a message or by another thread alone.
-
-        Raises
-        ------
-        RunOver
-            If the time is up and `ready()` does not hold.
+        Before the time `wakes()` [s], `ready()` changes by a message or by another thread alone. Raises `RunOver` if
+        the time is up and `ready()` does not hold.
         """
         me = self._seats[threading.get_ident()]
         if me.ended:

@@ -60,10 +60,7 @@ class World:
     def advance(self, until: float = 0.0) -> None:
         """Advance the arena to `until` [s], or to the next reading, at least by a step; offer it to the subscriptions.
 
-        Raises
-        ------
-        RunOver
-            When the time is up.
+        Raises `RunOver` when the time is up.
         """
         if self.over:
             raise RunOver
@@ -123,12 +120,8 @@ class World:
         """Take a message from the script: a command drives the robot, and the script's own subscriptions get it.
 
         The robot, and subscriptions that ask for reliable delivery, get none from a publisher that is not; those that
-        ask for what was kept get none from a publisher that keeps none.
-
-        Raises
-        ------
-        StubError
-            If a command is not a number.
+        ask for what was kept get none from a publisher that keeps none. Raises `StubError` if a command is not a
+        number.
         """
         self.once("published", topic)
         self.published[topic] = message._type_name

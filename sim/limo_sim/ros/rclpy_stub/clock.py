@@ -201,13 +201,7 @@ class Rate:
         self._calls += 1
 
     def sleep(self) -> None:
-        """Wait for the next period.
-
-        Raises
-        ------
-        StubError
-            If nothing spins the node, where ROS would wait for ever.
-        """
+        """Wait for the next period; raises `StubError` if nothing spins the node, where ROS would wait for ever."""
         world, before = self._context.world, self._calls
         patience = 2 * self._timer.timer_period_ns * 1e-9 + UNHEARD_AFTER
         if not world.turns.wait(lambda: self._calls != before, world.time + patience):

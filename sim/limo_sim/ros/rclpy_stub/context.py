@@ -24,10 +24,7 @@ class Context:
     def world(self) -> World:
         """The run, for the script's own threads.
 
-        Raises
-        ------
-        StubError
-            In a thread that the script did not start with `threading.Thread`.
+        Raises `StubError` in a thread that the script did not start with `threading.Thread`.
         """
         if self._world.turns.seat() is None:
             raise StubError(
@@ -43,13 +40,7 @@ class Context:
         self.is_initialized = True
 
     def shutdown(self) -> None:
-        """End.
-
-        Raises
-        ------
-        RuntimeError
-            If it has not begun, or has ended.
-        """
+        """End; raises `RuntimeError` if it has not begun, or has ended."""
         if not self.is_initialized:
             raise RuntimeError("rclpy.shutdown() has been called before, or rclpy.init() was not")
         self.is_initialized = False
@@ -71,13 +62,7 @@ def enter(context: Context) -> None:
 
 
 def default_context() -> Context:
-    """Return the default context, for what a script calls without a node.
-
-    Raises
-    ------
-    StubError
-        Outside a run.
-    """
+    """Return the default context, for what a script calls without a node; raises `StubError` outside a run."""
     if _default is None:
         raise StubError("this rclpy works inside `limo-hog run` alone")
     return _default

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Callable
 from enum import IntEnum
 from typing import Any
 
@@ -24,6 +25,14 @@ class LoggingSeverity(IntEnum):
 _levels: dict[str, LoggingSeverity] = {}
 
 
+def _speaker(level: LoggingSeverity) -> Callable[..., bool]:
+    def speak(logger: Logger, message: object, **options: Any) -> bool:
+        return logger._say(level, message, **options)
+
+    speak.__qualname__ = f"Logger.{level.name.lower()}"  # as Python's own errors show it
+    return speak
+
+
 class Logger(PartialApi, missing=("log", "is_enabled_for", "get_logger_name")):
     """Speaks under a name."""
 
@@ -42,28 +51,6 @@ class Logger(PartialApi, missing=("log", "is_enabled_for", "get_logger_name")):
     def get_effective_level(self) -> LoggingSeverity:
         """Return the level from which lines are shown."""
         return _levels.get(self.name, LoggingSeverity.INFO)
-
-    def debug(self, message: object, **options: Any) -> bool:
-        """Log a line of level DEBUG."""
-        return self._say(LoggingSeverity.DEBUG, message, **options)
-
-    def info(self, message: object, **options: Any) -> bool:
-        """Log a line of level INFO."""
-        return self._say(LoggingSeverity.INFO, message, **options)
-
-    def warning(self, message: object, **options: Any) -> bool:
-        """Say that something is odd."""
-        return self._say(LoggingSeverity.WARN, message, **options)
-
-    warn = warning
-
-    def error(self, message: object, **options: Any) -> bool:
-        """Say that something went wrong."""
-        return self._say(LoggingSeverity.ERROR, message, **options)
-
-    def fatal(self, message: object, **options: Any) -> bool:
-        """Say that nothing works any more."""
-        return self._say(LoggingSeverity.FATAL, message, **options)
 
     def _say(
         self,
@@ -91,6 +78,12 @@ class Logger(PartialApi, missing=("log", "is_enabled_for", "get_logger_name")):
                 return False
         world.link.tell("log", level.name, self.name, str(message))
         return True
+
+    debug = _speaker(LoggingSeverity.DEBUG)
+    info = _speaker(LoggingSeverity.INFO)
+    warning = warn = _speaker(LoggingSeverity.WARN)
+    error = _speaker(LoggingSeverity.ERROR)
+    fatal = _speaker(LoggingSeverity.FATAL)
 
 
 def get_logger(name: str) -> Logger:

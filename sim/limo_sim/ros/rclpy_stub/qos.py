@@ -92,10 +92,7 @@ class QoSProfile(PartialApi, missing=("get_c_qos_profile",)):
 def to_profile(given: QoSProfile | int) -> QoSProfile:
     """Return a profile; a number is the depth of the default one.
 
-    Raises
-    ------
-    TypeError, ValueError
-        As rclpy does, if it is neither.
+    Raises `TypeError` or `ValueError` as rclpy does, if it is neither.
     """
     if isinstance(given, QoSProfile):
         return given

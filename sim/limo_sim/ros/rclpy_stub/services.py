@@ -108,10 +108,7 @@ class Client(PartialApi, missing=("configure_introspection", "handle", "logger_n
     def call(self, request: Any, timeout_sec: float | None = None) -> Any:
         """Send a request and wait for its answer, None when `timeout_sec` is up.
 
-        Raises
-        ------
-        StubError
-            If the answer can never come, where ROS would wait for ever.
+        Raises `StubError` if the answer can never come, where ROS would wait for ever.
         """
         future = self.call_async(request)
         world = self._context.world

@@ -52,14 +52,8 @@ class Publisher(
     def publish(self, msg: Message) -> None:
         """Send a message.
 
-        Raises
-        ------
-        TypeError
-            If it is of another type.
-        InvalidHandle
-            If the publisher was destroyed.
-        StubError
-            If it is a command that is not a number.
+        Raises `TypeError` if it is of another type; `InvalidHandle` if the publisher was destroyed; `StubError` if it
+        is a command that is not a number.
         """
         if not isinstance(msg, self.msg_type):
             raise TypeError(

@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from limo_sim.run.score.card import ScoreCard
-from limo_sim.run.score.scorer import Scorer
+from limo_sim.run.score.scorer import Episode, Scorer
 
-__all__ = ["ScoreCard", "Scorer"]
+__all__ = ["Episode", "ScoreCard", "Scorer"]

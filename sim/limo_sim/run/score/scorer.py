@@ -11,6 +11,7 @@ import math
 from array import array
 from collections import Counter, deque
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -90,33 +91,23 @@ class Scorer:
         """Share of the steps whose command moves the robot."""
         return self._driven / max(self._steps, 1)
 
-    def card(
-        self,
-        *,
-        controller: str,
-        detector: str,
-        seed: int,
-        seconds: float,
-        contacts: Contacts,
-        wall_seconds: float,
-        target_distance: float | None = None,
-    ) -> ScoreCard:
-        """Return the card of the run whose steps were added; the parameters are the attributes of `Episode`."""
-        subject, target, motion = self._subjects[0], target_distance, self._motion
+    def card(self, run: Episode) -> ScoreCard:
+        """Return the card of the run whose steps were added."""
+        subject, target, motion = self._subjects[0], run.target_distance, self._motion
         errors, gaps = np.array(subject.pixel_errors, float), subject.gaps
         detect_ms, render_ms = np.array(self._detect_ms, float), np.array(self._render_ms, float)
         least = subject.distances.least
         return ScoreCard(
             scenario=self._scenario.name,
-            controller=controller,
-            detector=detector,
-            seed=seed,
-            seconds=round(seconds, 6),
+            controller=run.controller,
+            detector=run.detector,
+            seed=run.seed,
+            seconds=round(run.seconds, 6),
             scenario_hash=scenario_hash(self._scenario),
             code_version=code_version(),
             target_m=target,
             kept_m=None if target is None else subject.kept(target),
-            success=self._success(contacts, subject),
+            success=self._success(run.contacts, subject),
             frames=self._frames,
             first_detection_s=subject.first_detection,
             in_view=_share(subject.in_view, subject.frames),
@@ -137,8 +128,8 @@ class Scorer:
             intrusion_intimate=self._intrusion(Zone.INTIMATE),
             intrusion_personal=self._intrusion(Zone.PERSONAL),
             intrusion_social=self._intrusion(Zone.SOCIAL),
-            contacts_person=contacts.person,
-            contacts_wall=contacts.wall,
+            contacts_person=run.contacts.person,
+            contacts_wall=run.contacts.wall,
             lost=len(gaps),
             found_again=_share(sum(gap <= self._criteria.found_within_s for gap in gaps), len(gaps)),
             time_to_find_again_s=_share(sum(gaps), len(gaps)),
@@ -155,7 +146,7 @@ class Scorer:
             detect_ms_p95=_percentile(detect_ms, 95),
             detect_ms_mean=_share(float(detect_ms.sum()), len(detect_ms)),
             render_ms_p50=_percentile(render_ms, 50),
-            real_time_factor=seconds / wall_seconds if wall_seconds > 0 else 0.0,
+            real_time_factor=run.seconds / run.wall_seconds if run.wall_seconds > 0 else 0.0,
         )
 
     def _success(self, contacts: Contacts, subject: Subject) -> bool | None:
@@ -167,6 +158,24 @@ class Scorer:
 
     def _intrusion(self, zone: Zone) -> float | None:
         return self._nearest[zone] / self._steps if self._nearest else None
+
+
+@dataclass(frozen=True, slots=True)
+class Episode:
+    """A run that has ended."""
+
+    #: scenario, controller, detector, seed: what was run; the controller and the detector by name.
+    scenario: Scenario
+    controller: str
+    detector: str
+    seed: int
+    seconds: float  #: simulated time [s]
+    scorer: Scorer  #: has measured every control period
+    contacts: Contacts
+    wall_seconds: float  #: how long the run took [s]
+    #: Distance that the controller held at the end, from the camera to the person's surface [m]; None where it holds
+    #: none.
+    target_distance: float | None = None
 
 
 class _Motion:

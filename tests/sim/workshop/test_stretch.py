@@ -6,12 +6,10 @@ import re
 from pathlib import Path
 
 import pytest
-from tests.sim.workshop.strangers import checked, exchanged, nodes
+from tests.sim.workshop.strangers import FOLLOWER, checked, exchanged, nodes
 
 from limo_hog.cli.main import main
-from limo_sim.workshop import solution, template
-
-FOLLOWER = solution("follower")
+from limo_sim.workshop import template
 
 #: Nodes that do a task, or do it otherwise: by the public page's name of the depth image, or by a tracker from the
 #: first box on, which looks at nobody else. The last one drives until the chair's legs, ahead or beside, are near.

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
-from tests.sim.workshop.strangers import RIGHT, WRONG, checked, exchanged, nodes
+from tests.sim.workshop.strangers import FOLLOWER, RIGHT, WRONG, checked, exchanged, nodes
 
 from limo_hog.cli.main import main
 from limo_sim.workshop import solution, template
@@ -22,7 +22,7 @@ NODES = ("follower", "proxemic")
 #: The same node with a mistake: the checkpoint and words of the first finding, and what is exchanged for it.
 MISTAKES = nodes(
     "follower",
-    solution("follower"),
+    FOLLOWER,
     """
 the robot stands while no person is found | no box, and no command
     self.commands.publish(Twist()) → pass
@@ -140,7 +140,7 @@ def test_a_window_may_be_shown_by_a_timer(tmp_path: Path) -> None:
         def show(self, picture): → def show(self, picture):⏎    self.kept = picture⏎⏎def tick(self):
         cv2.imshow('Camera', picture) → cv2.imshow('Camera', self.kept)
     """
-    verdicts = checked(tmp_path, exchanged(solution("follower"), otherwise))
+    verdicts = checked(tmp_path, exchanged(FOLLOWER, otherwise))
     assert [(v.checkpoint, v.evidence) for v in verdicts if v.holds is not True] == []
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,13 @@ from limo_hog.follow.sense.observation import Observation, Odometry, Scan
 WIDTH, HEIGHT, FOCAL = 640, 480, 448.6
 RED, GREEN, BLUE = (40, 40, 170), (50, 140, 50), (130, 50, 35)
 NOBODY = Detections.none()
+T = TypeVar("T")
+
+
+def there(one: T | None) -> T:
+    """Return what is there: somebody in the arena, a box in the image."""
+    assert one is not None
+    return one
 
 
 def boxes(*rows: tuple[int, int, int, int], scores: tuple[float, ...] | None = None) -> Detections:
@@ -93,12 +101,8 @@ class World:
         x, y, yaw = self.robot
         depth = self.distance * math.cos(self.bearing) - 0.084
         odometry = Odometry(self.time, x, y, yaw, self.told.linear, self.told.angular)
-        seen = replace(
-            look(stamp=self.time),
-            depth=flat(8.0),
-            scan=scan(stamp=self.time) if self.lidar else None,
-            odometry=odometry,
-        )
+        turn = scan(stamp=self.time) if self.lidar else None
+        seen = replace(look(stamp=self.time), depth=flat(8.0), scan=turn, odometry=odometry)
         if not visible or abs(self.bearing) > 0.55:
             return seen
         height = 0.9 * FOCAL / depth

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from tests.follow.views import there as there
 
 from limo_hog.detections import Detections
 from limo_hog.follow.decision import Belief, Decision, Mode
@@ -114,9 +115,6 @@ def figures(card: ScoreCard) -> dict[str, Any]:
     return told
 
 
-T = TypeVar("T")
-
-
 def kept_in(steps: list[Step]) -> Callable[[Step], None]:
     """What a run is to be watched by, so that its steps are kept."""
     return lambda step: steps.append(step.bare())
@@ -149,9 +147,3 @@ def poses_of(
         crowd.advance(step * STEP_S, robot)
         seen.append(crowd.poses)
     return seen
-
-
-def there(one: T | None) -> T:
-    """Return what is there: somebody in the arena, a box in the image."""
-    assert one is not None
-    return one

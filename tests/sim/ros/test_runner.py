@@ -1,20 +1,22 @@
-"""A node in a process of its own: however it ends, there are a score card and one line of why."""
+"""A node in a process of its own: however it ends, there are a score card and one line of why; processes that wait."""
 
 from __future__ import annotations
 
 import gc
 import subprocess
 import sys
+import threading
 import time
 import tracemalloc
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 from tests.sim.logs import kept_in
 from tests.sim.ros.scripts import DRIVE, FOLLOW, STANDING, Run, node
 
-from limo_sim.ros import runner
+from limo_sim.ros import runner, worker
 from limo_sim.ros.stage import Ended, score_of
 from limo_sim.run.log import Step
 
@@ -142,3 +144,45 @@ def test_ctrl_c_ends_run_and_node_and_leaves_no_process(script: Callable[[str], 
         assert run.returncode == 128 + 15
         assert time.monotonic() - began < 20
     assert not Path(f"/proc/{pid}").exists()
+
+
+class Waiting:
+    """A process that waits, and is never started."""
+
+    waits = True
+
+    def kill(self) -> None:
+        raise AssertionError("it waits")
+
+
+class TakenMeanwhile(list[Waiting]):
+    """A list that looks as it did before another thread took the last of it."""
+
+    def __len__(self) -> int:
+        return 1
+
+
+@pytest.fixture(autouse=True)
+def no_processes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(worker, "Worker", Waiting)
+    monkeypatch.setattr(worker, "idle", [])
+
+
+def test_a_process_that_another_thread_takes_meanwhile_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(worker, "idle", TakenMeanwhile())
+    with worker.ready() as given:
+        assert isinstance(given, Waiting)
+
+
+def test_threads_never_share_a_process_and_leave_theirs_for_the_next() -> None:
+    together = threading.Barrier(8)
+
+    def take(_: int) -> int:
+        with worker.ready() as given:
+            together.wait(10)
+            return id(given)
+
+    with ThreadPoolExecutor(8) as pool:
+        for _ in range(3):
+            assert len(set(pool.map(take, range(8)))) == 8
+    assert len(worker.idle) == 8

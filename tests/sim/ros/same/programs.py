@@ -19,6 +19,7 @@ from rclpy.time import Time
 from std_msgs.msg import Int32, String
 from std_srvs.srv import SetBool, Trigger
 
+
 def attempt(work):
     """Return what a call gives, or the name of what it raises."""
     try:

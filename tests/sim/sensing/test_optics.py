@@ -34,10 +34,9 @@ def test_a_place_in_the_image_moves_as_opencvs_camera_model_says(k1: float, k2: 
     for u, v in expected:
         if not (12 < u < WIDTH - 12 and 12 < v < HEIGHT - 12):
             continue
-        rows, columns = np.mgrid[round(v) - 12 : round(v) + 13, round(u) - 12 : round(u) + 13]
-        light = bent[rows, columns]
-        assert (columns * light).sum() / light.sum() == pytest.approx(u, abs=0.3)
-        assert (rows * light).sum() / light.sum() == pytest.approx(v, abs=0.3)
+        places_near = np.mgrid[round(v) - 12 : round(v) + 13, round(u) - 12 : round(u) + 13]
+        light = bent[tuple(places_near)]
+        assert (places_near * light).sum(axis=(1, 2)) / light.sum() == pytest.approx((v, u), abs=0.3)
 
 
 @pytest.mark.parametrize("k1", [-0.12, 0.25])
@@ -49,9 +48,8 @@ def test_the_true_box_goes_round_the_bent_silhouette(k1: float) -> None:
     rows, columns = np.nonzero(frame.depth < empty.depth - 0.05)
     left, top, width, height = there(there(frame.truth.people[0]).box)
     # Nothing is cut off; a box's corner may bend farther than the silhouette, which has none.
-    beside = columns.min() - left, left + width - columns.max() - 1
-    above = rows.min() - top, top + height - rows.max() - 1
-    assert all(-1 <= outside <= 9 for outside in (*beside, *above))
+    edges = columns.min() - left, rows.min() - top, left + width - columns.max() - 1, top + height - rows.max() - 1
+    assert all(-1 <= outside <= 9 for outside in edges)
 
 
 @pytest.mark.parametrize(("x", "y"), [(1.7, 1.26), (2.5, 1.7), (2.5, 1.8), (3.5, 2.4)])

@@ -225,8 +225,7 @@ def test_a_door_is_found_and_one_too_narrow_is_none() -> None:
 
 
 def test_ways_within_the_margin_begin_without_it() -> None:
-    plan = FloorPlan([Rectangle(0, 0, 1, 1)], 5.0, 0.3)
-    place, length = plan.way((-1.1, 0), (1.1, 0))
+    place, length = FloorPlan([Rectangle(0, 0, 1, 1)], 5.0, 0.3).way((-1.1, 0), (1.1, 0))
     assert place[0] == pytest.approx(-1.3, abs=0.01)
     assert length < 2 * math.hypot(1.3, 0.2) + 2.7
 

@@ -210,14 +210,11 @@ def test_a_seed_draws_clothes_stature_speed_and_places_within_what_is_asked_for(
     assert max(heights) - min(heights) > 0.15 * PLAIN.people[0].height
 
 
-def test_what_is_not_asked_for_stays() -> None:
+def test_what_is_not_asked_for_stays_and_people_that_do_not_fit_are_refused() -> None:
     run = of_run(dataclasses.replace(PLAIN, vary=Vary(speed=0.5)), 5)
     assert run.people[0].speed != PLAIN.people[0].speed
     for person, plain in zip(run.people, PLAIN.people, strict=True):
         assert dataclasses.replace(person, speed=plain.speed) == plain
-
-
-def test_people_that_do_not_fit_are_refused_by_name() -> None:
     tall = dataclasses.replace(DRAWN, people=tuple(Person(route=((3.0, 0.0, 0.0),), height=2.0) for _ in range(16)))
     with pytest.raises(ScenarioError, match="vary: no people that fit found"):
         of_run(tall, 0)

@@ -96,7 +96,7 @@ def test_a_robot_of_weak_brakes_keeps_more_room() -> None:
     assert 0 < speeds[0] < speeds[1] < 0.9
 
 
-def test_a_lidar_that_looks_backwards_guards_the_way_back_and_what_is_ahead_is_for_the_depth_image() -> None:
+def test_a_lidar_that_looks_backwards_guards_the_way_back_not_the_way_ahead() -> None:
     # The same beam, straight ahead of the lidar: 0.5 m off, ahead of a Limo and behind the other.
     turned = replace(LIMO, lidar_x=0.0, lidar_yaw=math.pi)
     ranges = np.full(292, np.inf, np.float32)

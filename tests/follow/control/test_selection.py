@@ -188,7 +188,7 @@ def test_a_word_takes_the_person_meant_once_people_were_looked_at_for_a_second()
     assert (after.number, after.likeness is not None, after.asked) == (2, True, None)
 
 
-def test_until_the_person_asked_for_is_in_view_nobody_else_is_begun_with_and_nobody_is_left() -> None:
+def test_until_the_person_asked_for_is_in_view_nobody_is_begun_with_and_nobody_left() -> None:
     assert choose(Choice(asked=7), plain(1)).number is None
     follows = Choice(1, known(one=1.0), NOW)
     for asked in (7, "left"):

@@ -120,7 +120,7 @@ def test_a_late_frame_does_not_make_it_swing() -> None:
     assert overshoot > -0.12
 
 
-def test_it_backs_away_from_a_person_who_comes_near_but_not_into_what_its_map_shows_behind() -> None:
+def test_it_backs_away_from_a_person_who_comes_near_but_not_into_what_is_behind() -> None:
     world = World()
     state = run(world, 12.0).state
     world.velocity = (-0.3, 0.0)
@@ -314,7 +314,7 @@ def test_a_person_in_other_clothes_is_not_the_lost_one_until_long_after() -> Non
     assert decision.reason == "following a person"
 
 
-def test_who_wears_what_the_lost_person_wore_is_followed_at_once_and_anybody_without_a_colour_image() -> None:
+def test_who_wears_the_lost_persons_clothes_or_any_unknown_ones_is_followed_at_once() -> None:
     world = World()
     state = lost(world)
     decision = CONTROLLER.step(seen_in(world.observe(), RED), state)

@@ -149,7 +149,7 @@ def test_an_obstacle_just_behind_the_lidars_field_of_view_is_remembered() -> Non
     assert after == before > 0
 
 
-def test_returns_are_forgotten_where_the_lidar_sees_nothing_now_or_its_clock_was_set_back() -> None:
+def test_returns_are_forgotten_where_nothing_is_seen_now_or_a_clock_was_set_back() -> None:
     # It stood at 100 degrees to the left, near the end of the field of view, and walks off.
     before, after = returns_kept((0.103 + 0.35 * np.cos(1.9), 0.35 * np.sin(1.9)), Odometry(0.1))
     assert before > after == 0

@@ -19,7 +19,7 @@ def worn(image: NDArray[np.uint8], box: tuple[int, int, int, int] = BOX) -> NDAr
     return clothes
 
 
-def test_other_clothes_are_told_the_same_are_known_again_and_unknown_ones_are_not_unlike() -> None:
+def test_other_clothes_are_told_the_same_known_again_and_unknown_ones_not_unlike() -> None:
     one, other = worn(dressed(BOX, RED, BLUE)), worn(dressed(BOX, GREEN, BLUE))
     assert APPEARANCE.cost(one, one) == APPEARANCE.cost(None, one) == APPEARANCE.cost(one, None) == 0
     assert APPEARANCE.cost(one, other) > OTHER_CLOTHES

@@ -142,7 +142,7 @@ def test_no_way_leads_through_a_door_narrower_than_the_robot_needs() -> None:
     assert ROUTER.way_towards(GRID, ground, HERE, at((2.5, 0.0))[0])[:, 0].max() < 1.0
 
 
-def test_places_along_a_way_are_so_far_from_where_it_passes_the_robot_and_never_beyond_its_end() -> None:
+def test_places_along_a_way_are_so_far_from_the_robot_and_never_beyond_its_end() -> None:
     way = np.stack([np.arange(0, 2, 0.1), np.zeros(20)], axis=1)
     ahead = along(way, Odometry(x=0.5, y=0.3), np.array([0.0, 0.25, 9.0]))
     assert ahead == pytest.approx(np.array([(0.5, 0.0), (0.75, 0.0), (1.9, 0.0)]))

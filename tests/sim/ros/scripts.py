@@ -81,9 +81,10 @@ def run_script(
         printed[name] += text
         getattr(sys, name).write(text)
 
-    stage = Stage(
-        script, scenario, seconds, seed, log=lambda at, level, _, text: logged.append((at, level, text)), **watching
-    )
+    def log(at: float, level: str, _: object, text: str) -> None:
+        logged.append((at, level, text))
+
+    stage = Stage(script, scenario, seconds, seed, log=log, **watching)
     return Ran(**vars(run_node(stage, arguments, limits=Limits(patience), said=hear)), logged=logged, printed=printed)
 
 

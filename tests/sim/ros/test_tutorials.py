@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from tests.sim.logs import there
 from tests.sim.ros.scripts import DRIVE, NOBODY, STANDING, Ran, Run, node, run_script
 
 from limo_sim.world.scenario import Scenario
@@ -32,7 +33,7 @@ def test_a_subscription_that_hears_nothing_warns_after_two_seconds_and_names_a_t
     ]
 
 
-def test_a_publisher_and_a_subscription_of_other_qualities_exchange_nothing_and_ros_says_so(run: Run) -> None:
+def test_a_publisher_and_a_subscription_of_other_qualities_are_told_that_they_differ(run: Run) -> None:
     make = """
     from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
     best = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -42,10 +43,9 @@ def test_a_publisher_and_a_subscription_of_other_qualities_exchange_nothing_and_
     """
     ended = run(node(DRIVE, make), seconds=0.5)
     reader, writer = (said for _, _, said in ended.logged)
-    assert reader.endswith("incompatible QoS. No messages will be sent to it. Last incompatible policy: RELIABILITY")
-    assert writer.endswith(
-        "incompatible QoS. No messages will be received from it. Last incompatible policy: DURABILITY"
-    )
+    for said, way, policy in ((reader, "sent to", "RELIABILITY"), (writer, "received from", "DURABILITY")):
+        last = f"incompatible QoS. No messages will be {way} it. Last incompatible policy: {policy}"
+        assert said.endswith(last)
     assert reader in ended.failure
     assert not ended.stage.commands
 
@@ -53,14 +53,12 @@ def test_a_publisher_and_a_subscription_of_other_qualities_exchange_nothing_and_
 def test_a_node_of_a_package_finds_the_packages_modules_and_files(tmp_path: Path) -> None:
     package = tmp_path / "src" / "amy"
     (package / "amy").mkdir(parents=True)
-    (package / "package.xml").write_text("<package/>")
-    (package / "amy" / "__init__.py").write_text("")
-    (package / "amy" / "helper.py").write_text("WORD = 'there'\n")
-    (package / "amy" / "go.py").write_text(
-        "import rclpy\nfrom ament_index_python.packages import get_package_share_directory as share\n"
-        "from amy.helper import WORD\nrclpy.init()\nlogger = rclpy.create_node('go').get_logger()\n"
-        "for word in (WORD, share('amy'), share('unknown')):\n    logger.info(word)\n"
-    )
+    go = "import rclpy\nfrom ament_index_python.packages import get_package_share_directory as share\n"
+    go += "from amy.helper import WORD\nrclpy.init()\nlogger = rclpy.create_node('go').get_logger()\n"
+    go += "for word in (WORD, share('amy'), share('unknown')):\n    logger.info(word)\n"
+    files = {"package.xml": "<package/>", "amy/__init__.py": "", "amy/helper.py": "WORD = 'there'\n", "amy/go.py": go}
+    for name, text in files.items():
+        (package / name).write_text(text)
     ended = run_script(package / "amy" / "go.py", seconds=0.2)
     assert [said for _, _, said in ended.logged] == ["there", str(package), str(package / "amy")]
 
@@ -78,9 +76,7 @@ def commands(run: Ran) -> list[tuple[float, float, float]]:
 
 def bearing(run: Ran) -> float:
     """Where the first person is in the end, seen from the robot [rad]."""
-    person = run.stage.arena.truth().people[0]
-    assert person is not None
-    return person.bearing
+    return there(run.stage.arena.truth().people[0]).bearing
 
 
 def test_a_callback_may_wait_for_a_service_in_a_multi_threaded_executor() -> None:

@@ -47,7 +47,7 @@ def fingerprint(name: str, seed: int, steps: int = 60) -> str:
 
 
 @pytest.mark.parametrize("name", ["occlusion", "furniture"])
-def test_the_same_seed_gives_the_same_run_in_another_process_and_another_seed_does_not(name: str) -> None:
+def test_the_same_seed_gives_the_same_run_in_another_process_and_another_does_not(name: str) -> None:
     code = f"import sys; sys.path.insert(0, {__file__!r}.rpartition('/')[0]); "
     code += f"from test_arena import fingerprint; print(fingerprint({name!r}, 3))"
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)

@@ -86,7 +86,7 @@ def test_noise_has_the_spread_asked_for_and_ranges_keep_their_limits() -> None:
 
 def test_a_scan_has_the_robots_beams_and_sees_inner_walls_and_the_walls_of_any_room() -> None:
     scan = Arena(Scenario.load("empty"), 0).scan()
-    assert (scan.ranges.shape, scan.ranges.dtype) == ((292,), np.float32)
+    assert scan.ranges.shape == (292,) and scan.ranges.dtype == np.float32
     assert (scan.angle_min, scan.angle_max, scan.range_min, scan.range_max) == (-2.0, 2.0, 0.12, 8.0)
     assert scan.ranges[140:152] == pytest.approx(4.9 - 0.103, abs=0.05)
     wall = Wall((1.0, 1.0), (3.0, 1.0), 0.2)

@@ -31,7 +31,7 @@ def walked(person: Person, seconds: float, *walls: Wall) -> list[Pose]:
     return [there(one) for (one,) in poses(Scenario(people=(person,), walls=walls, robot=CORNER), seconds)]
 
 
-def test_the_corners_of_the_route_are_visited_in_order_with_their_pauses_and_as_people_walk() -> None:
+def test_a_routes_corners_are_visited_in_order_with_pauses_and_as_people_walk() -> None:
     seen = walked(YIELDS, 25.0)
     near = [[math.dist((pose.x, pose.y), corner[:2]) < 0.3 for pose in seen].index(True) for corner in YIELDS.route[1:]]
     assert near == sorted(near)
@@ -204,8 +204,8 @@ def test_a_person_who_yields_walks_round_a_mover() -> None:
 
 
 def test_the_way_is_straight_where_nothing_stands_in_it() -> None:
-    way = FloorPlan([Rectangle(0, 3, 1, 1)], 5.0, 0.3).way((-2, 0), (2, 1))
-    assert way == ((2, 1), pytest.approx(math.hypot(4, 1)))
+    place, length = FloorPlan([Rectangle(0, 3, 1, 1)], 5.0, 0.3).way((-2, 0), (2, 1))
+    assert place == (2, 1) and length == pytest.approx(math.hypot(4, 1))
 
 
 def test_the_way_round_a_square_or_disc_is_as_long_as_geometry_says() -> None:

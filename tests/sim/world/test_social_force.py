@@ -45,7 +45,7 @@ def test_the_push_is_the_slope_of_the_papers_potential(at: tuple[float, float], 
     np.testing.assert_allclose(felt(at, velocity), downhill * (1.0 if in_sight else 0.5), rtol=1e-5)
 
 
-def test_what_is_behind_counts_half_a_wall_hides_and_bodies_that_touch_are_pushed_apart() -> None:
+def test_what_is_behind_counts_half_a_wall_hides_and_touching_bodies_part() -> None:
     before = felt((-0.8, 0.0))[0]
     assert before == pytest.approx(-7.0 * math.exp(-0.8 / 0.3))
     assert felt((0.8, 0.0))[0] == pytest.approx(-0.5 * before)

@@ -44,7 +44,6 @@ def dressed(
 
 
 def flat(depth: float) -> NDArray[np.float32]:
-    """A depth image of one distance."""
     return np.full((HEIGHT, WIDTH), depth, np.float32)
 
 
@@ -71,7 +70,6 @@ def scan_of(points: list[tuple[float, float]], stamp: float = 0.0) -> Scan:
 
 
 def look(detections: Detections = NOBODY, stamp: float = 0.0) -> Observation:
-    """An observation with a camera alone."""
     return Observation(stamp, WIDTH, HEIGHT, FOCAL, detections)
 
 
@@ -113,7 +111,6 @@ class World:
         return replace(seen, detections=boxes(box, scores=(score,)), depth=before_wall(depth, box))  # type: ignore[arg-type]
 
     def drive(self, twist: Twist) -> None:
-        """Let a control period pass."""
         self.told = twist
         x, y, yaw = self.robot
         yaw += twist.angular * self.period

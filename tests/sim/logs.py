@@ -80,14 +80,12 @@ def step(
 
 
 def followed(number: int, time: float | None = None) -> Step:
-    """A step in which the person is found and followed."""
     return step(number, person(), boxes=[ON], target=0, time=time)
 
 
 def card(
     *steps: Step, target: float | None = 1.5, contacts: Contacts = TOUCHED, criteria: Criteria | None = None
 ) -> ScoreCard:
-    """The score card of these steps."""
     scenario = Scenario.load("two_people")
     scorer = Scorer(scenario, criteria or CRITERIA)
     add(scorer, steps)

@@ -23,7 +23,6 @@ NOW = 5.0
 
 
 def run(world: World, seconds: float, state: TrackingState | None = None, **seen: bool) -> Decision[TrackingState]:
-    """Let the controller drive the world's robot."""
     state = state or CONTROLLER.start()
     for _ in range(round(seconds / world.period)):
         decision = CONTROLLER.step(world.observe(**seen), state)

@@ -57,8 +57,6 @@ def test_no_person_is_where_the_camera_shows_none() -> None:
 
 @dataclass(frozen=True, slots=True)
 class Counted(Grid):
-    """A grid that notes how many places are looked from, and at."""
-
     asked: list[tuple[int, int]] = field(default_factory=list)
 
     def sees(self, ground: Ground, origins: Points, places: Points, *, lasting: bool = False) -> NDArray[np.bool_]:

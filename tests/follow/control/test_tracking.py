@@ -11,7 +11,7 @@ from tests.follow.control.driven import CONTROLLER, run
 from tests.follow.views import GREEN, RED, World, flat, scan_of, there
 
 from limo_hog.detections import Detections
-from limo_hog.follow import Decision, Mode, Observation, Odometry
+from limo_hog.follow import Decision, Mode, Observation, Odometry, Twist
 from limo_hog.follow.control.selection import TrackingState
 from limo_hog.follow.sense.clearance import NO_POINTS
 from limo_hog.follow.sense.observation import clothes_in
@@ -20,8 +20,7 @@ from limo_hog.follow.sense.observation import clothes_in
 def test_it_faces_a_new_person_at_once_and_drives_only_when_sure() -> None:
     world = World(person=(3.0, 1.0))
     first = run(world, 0.1)
-    assert first.twist.angular > 0.3
-    assert first.twist.linear == 0
+    assert first.twist.angular > 0.3 and first.twist.linear == 0
     assert "possible person" in first.reason
     assert run(world, 1.5, first.state).twist.linear > 0.2
 
@@ -54,17 +53,15 @@ def test_a_person_gone_is_lost_and_searched_for_the_way_they_went(side: float) -
     decision = run(world, 1.5, run(world, 4.0).state, visible=False)
     assert decision.reason == "following the legs or the predicted position"
     decision = run(world, 2.0, decision.state, visible=False)
-    assert decision.mode is Mode.LOST
-    assert decision.twist.linear == 0
-    assert decision.reason == "searching for the lost person"
-    assert decision.twist.angular == side * CONTROLLER.lookout.search_rate
+    assert (decision.mode, decision.reason) == (Mode.LOST, "searching for the lost person")
+    assert decision.twist == Twist(0.0, side * CONTROLLER.lookout.search_rate)
 
 
 def test_legs_in_the_scan_keep_a_person_too_near_for_the_camera() -> None:
     world = World(person=(1.6, 0.0))
     state = run(world, 4.0).state
+    world.velocity = (-0.25, 0.0)
     for _ in range(30):
-        world.velocity = (-0.25, 0.0)
         legs = scan_of([(world.distance, 0.08), (world.distance, -0.08)], world.time)
         view = replace(world.observe(visible=False), scan=legs)
         decision = CONTROLLER.step(view, state)
@@ -149,8 +146,7 @@ def test_it_backs_past_what_was_seen_behind_and_keeps_the_person_in_the_image() 
         assert decision.reason == "giving way to a person"
         turns[side] = decision.twist.angular
     # Turned to the right its back goes to the left, and the other way round.
-    assert turns[1.0] > 0.3
-    assert turns[-1.0] < -0.3
+    assert turns[1.0] > 0.3 and turns[-1.0] < -0.3
     straight = CONTROLLER.step(replace(world.observe(), remembered=NO_POINTS), state)
     assert abs(straight.twist.angular) < 0.1
 
@@ -181,10 +177,8 @@ def test_before_a_person_is_found_it_turns_to_what_walks_beside_it() -> None:
     world = World(person=(-3.0, 0.0))
     walked = [(0.3 + 0.06 * step, -1.8) for step in range(25)]
     decision = walking(world, CONTROLLER.start(), walked)
-    assert decision.mode is Mode.SEARCH
-    assert decision.reason == "turning to what moves in the scan"
-    assert decision.twist.angular < -0.5
-    assert decision.twist.linear == 0
+    assert (decision.mode, decision.reason) == (Mode.SEARCH, "turning to what moves in the scan")
+    assert decision.twist.angular < -0.5 and decision.twist.linear == 0
     # Nothing moves where legs stand: it searches to the side it began with.
     standing = walking(World(person=(-3.0, 0.0)), CONTROLLER.start(), [(0.3, -1.8)] * 25)
     assert standing.twist.angular == CONTROLLER.lookout.search_rate
@@ -306,8 +300,7 @@ def test_a_person_in_other_clothes_is_not_the_lost_one_until_long_after() -> Non
         world.time += world.period
     world.time += 0.5
     decision = CONTROLLER.step(seen_in(world.observe(), GREEN), state)
-    assert decision.target == 0
-    assert decision.reason == "following another person: the lost one was not found"
+    assert (decision.target, decision.reason) == (0, "following another person: the lost one was not found")
     for _ in range(30):
         world.time += world.period
         decision = CONTROLLER.step(seen_in(world.observe(), GREEN), decision.state)
@@ -337,11 +330,9 @@ def test_between_two_alike_it_stands_and_looks_and_says_that_it_is_not_sure() ->
     doubtful = replace(there(state.choice.likeness), chances=((one, 0.5), (two, 0.45)))
     standing = replace(world.observe(), odometry=Odometry(world.time, *world.robot))
     decision = CONTROLLER.step(standing, replace(state, choice=replace(state.choice, likeness=doubtful)))
-    assert decision.mode is Mode.HOLD
+    assert (decision.mode, decision.target) == (Mode.HOLD, None)
     assert decision.reason == "not sure which of 2 is the person followed"
-    assert decision.twist.linear == 0
     # Both are kept in view: it turns to between them.
-    assert decision.twist.angular > 0.1
-    assert decision.target is None
+    assert decision.twist.linear == 0 and decision.twist.angular > 0.1
     same = [round(person.same or 0.0, 1) for person in decision.belief.people]
     assert same == [0.5, 0.5] or same == [0.5, 0.4]

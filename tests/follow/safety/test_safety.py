@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.follow.safety.headstrong import Headstrong, ahead
+from tests.follow.loop import Headstrong, ahead
 from tests.follow.views import NOBODY, boxes, flat, look, scan, scan_of
 
 from limo_hog.detections import Detections
@@ -387,7 +387,6 @@ def test_the_ground_that_the_robot_left_straight_on_was_free(driven: float, seen
 
 
 def looks_after(*stamps: float) -> list[float]:
-    """Return the stamps of the scans that are kept for the ground they show to be free."""
     state = ahead().start()
     for stamp in stamps:
         state = ahead().step(whole(stamp), state).state

@@ -27,8 +27,6 @@ from limo_sim.world.scenario import Scenario
 
 @dataclass
 class Spy:
-    """Notes what it is shown and finds one box."""
-
     shown: list[NDArray[np.uint8]] = field(default_factory=list)
 
     def detect(self, image: NDArray[np.uint8]) -> Detections:

@@ -73,7 +73,6 @@ def run_script(
     patience: float = 20.0,
     **watching: Any,
 ) -> Ran:
-    """Run a script against the arena as `limo-hog run` does."""
     logged: list[tuple[float, str, str]] = []
     printed = {"stdout": "", "stderr": ""}
 

@@ -125,8 +125,6 @@ def test_ctrl_c_ends_run_and_node_and_leaves_no_process(script: Callable[[str], 
 
 
 class Waiting:
-    """A process that waits, and is never started."""
-
     waits = True
 
     def kill(self) -> None:

@@ -28,7 +28,6 @@ ALONE = {"ROS_DOMAIN_ID": str(DOMAIN), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHO
 
 
 def by_program(text: str) -> dict[str, list[str]]:
-    """Part what was printed by the headings."""
     parts = re.split(r"^# (\w+)\n", text, flags=re.MULTILINE)[1:]
     return {name: lines.splitlines() for name, lines in zip(parts[::2], parts[1::2], strict=True)}
 

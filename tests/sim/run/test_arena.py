@@ -33,7 +33,6 @@ YIELDS = Person(route=((1.0, 2.0, 0.0), (3.0, 2.0, 0.0)), behaviour="social_forc
 
 
 def fingerprint(name: str, seed: int, steps: int = 60) -> str:
-    """Hash everything a run shows."""
     arena, digest = Arena(Scenario.load(name), seed), hashlib.sha256()
     for step in range(steps):
         if step % 5 == 0:

@@ -43,8 +43,6 @@ PERSON = Person(route=((2.0, 0.0, 3600.0),))
 
 
 class Faulty:
-    """A detector with the faults of a scenario with two people."""
-
     def __init__(self, detector: Detector, faults: DetectorFaults, seed: int = 0) -> None:
         scenario = Scenario(people=(PERSON, PERSON), detector=faults, camera=Camera(rate_hz=10.0))
         self._detector, self._truth = detector, truth(0)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.follow.safety.headstrong import Headstrong
+from tests.follow.loop import Headstrong
 from tests.sim.logs import drive
 
 from limo_hog import PeopleDetector

@@ -48,7 +48,6 @@ def steps() -> list[Step]:
 
 
 def pictured(step: Step, image: NDArray[np.uint8]) -> Step:
-    """Return a step whose frame shows another image."""
     frame = dataclasses.replace(there(step.log.frame), image=image)
     return dataclasses.replace(step, log=dataclasses.replace(step.log, frame=frame))
 

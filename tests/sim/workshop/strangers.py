@@ -211,13 +211,11 @@ if __name__ == "__main__":
 
 
 def checked(folder: Path, text: str, exercise: str = "follower") -> list[Verdict]:
-    """Return what the checker says of a node."""
     (folder / "node.py").write_text(text, encoding="utf-8")
     return examine(folder / "node.py", exercise).verdicts
 
 
 def written(folder: Path, **texts: str) -> Path:
-    """Write files of these names, and return their folder."""
     folder.mkdir(exist_ok=True)
     for name, text in texts.items():
         (folder / f"{name}.py").write_text(text)

@@ -29,7 +29,6 @@ def attempt(work):
 
 
 def spin(node, seconds, executor=None):
-    """Run a node's callbacks for a time."""
     until = time.monotonic() + seconds
     while rclpy.ok() and time.monotonic() < until:
         rclpy.spin_once(node, executor=executor, timeout_sec=0.02)

@@ -72,38 +72,29 @@ def network(path: Path, *layers: tuple[NDArray[np.float32], NDArray[np.float32]]
     return path
 
 
-def test_a_policy_is_a_network_with_tanh_between_its_layers(tmp_path: Path) -> None:
+def test_a_policy_is_a_network_with_tanh_whose_action_is_in_units_of_the_environments(tmp_path: Path) -> None:
     random = np.random.default_rng(0)
     w0, w1, b0, b1 = (random.normal(size=size).astype(np.float32) for size in ((SIZE, 4), (4, 2), 4, 2))
     policy = controller_of(f"policy:{network(tmp_path / 'a.npz', (w0, b0), (w1, b1))}")
     assert isinstance(policy, Policy)
     state = random.normal(size=SIZE).astype(np.float32)
     np.testing.assert_allclose(policy.act(state), np.clip(np.tanh(state @ w0 + b0) @ w1 + b1, -1, 1), rtol=1e-6)
-
-
-def test_a_policys_action_is_in_units_of_the_environments(tmp_path: Path) -> None:
     constant = np.zeros((SIZE, 2), np.float32), np.array([0.5, -2.0], np.float32)
-    policy = Policy(network(tmp_path / "a.npz", constant))
+    policy = Policy(network(tmp_path / "b.npz", constant))
     decision = policy.step(seeing((2.5, 0.8)), policy.start())
     assert (decision.twist.linear, decision.twist.angular) == pytest.approx((0.35, -1.5))
     assert isinstance(decision.state, LastSeen)
 
 
-@pytest.mark.parametrize(
-    ("name", "target", "told"),
-    [
+def test_wrong_controllers_and_files_that_are_no_policies_are_refused_by_name(tmp_path: Path) -> None:
+    for name, target, told in (
         ("nobody", None, "no controller 'nobody': want one of approach, proxemic, tracking, pursuit, ppo"),
         ("ppo", 2.0, "the controller ppo holds the distance it was trained for"),
         ("approach", 2.0, "approach controller holds no distance"),
         ("policy:none.npz", None, "none.npz: cannot be read as a policy"),
-    ],
-)
-def test_wrong_controllers_are_refused_by_name(name: str, target: float | None, told: str) -> None:
-    with pytest.raises(ControllerError, match=told):
-        controller_of(name, target)
-
-
-def test_files_that_are_no_policies_are_refused_by_name(tmp_path: Path) -> None:
+    ):
+        with pytest.raises(ControllerError, match=told):
+            controller_of(name, target)
     (tmp_path / "text.npz").write_text("no network")
     network(tmp_path / "wrong.npz", (np.zeros((4, 2), np.float32), np.zeros(2, np.float32)))
     np.savez(tmp_path / "pickled.npz", w0=np.array([object()]), b0=np.zeros(2))

@@ -78,8 +78,7 @@ def test_what_is_written_is_coco_with_depth_and_identities(tmp_path: Path, capsy
     assert {note["track_id"] for note in data["annotations"]} <= {0, 1}
     assert all(note["iscrowd"] == (note["visible"] < 0.65) for note in data["annotations"])
     pictures = read_labels(out / "coco.json")
-    assert len(pictures) == 8
-    assert sum(len(picture.boxes) for picture in pictures) == len(data["annotations"]) > 0
+    assert len(pictures) == 8 and sum(len(picture.boxes) for picture in pictures) == len(data["annotations"]) > 0
     note = next(note for note in data["annotations"] if note["visible"] > 0.95)
     image = data["images"][note["image_id"] - 1]
     depth = there(cv2.imread(str(out / image["depth_file_name"]), cv2.IMREAD_UNCHANGED))

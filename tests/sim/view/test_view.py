@@ -68,13 +68,12 @@ def test_a_paused_run_goes_on_one_step_at_a_time() -> None:
 
 
 def test_the_page_is_served_on_loopback_alone() -> None:
+    own = socket.gethostbyname(socket.gethostname())
     with View(WORKSHOP) as view:
         assert view.url.startswith("http://127.0.0.1:")
-        port = int(view.url.rsplit(":", 1)[1].strip("/"))
-        own = socket.gethostbyname(socket.gethostname())
         if not own.startswith("127."):
             with pytest.raises(OSError, match=r"refused"):
-                socket.create_connection((own, port), timeout=2)
+                socket.create_connection((own, int(view.url.rsplit(":", 1)[1].strip("/"))), timeout=2)
 
 
 def test_the_rollouts_on_the_map_begin_at_the_robot_and_lead_where_it_drives() -> None:

@@ -393,9 +393,6 @@ WRONG = {
 4 steers by the blue shirt
     error = middle - cx → blue = (image[..., 0].astype(int) - image[..., 2] > 50).nonzero()[1]
         ⏎error = middle - blue.mean() if len(blue) else 0.0
-any best effort commands
-    from rclpy.node → from rclpy.qos import QoSProfile, ReliabilityPolicy⏎from rclpy.node
-    '/cmd_vel', 10) → '/cmd_vel', QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT))
 """,
     ),
     "any the model solution, read": (

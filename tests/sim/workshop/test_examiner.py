@@ -7,7 +7,7 @@ import weakref
 from pathlib import Path
 
 import pytest
-from tests.sim.workshop.strangers import FOLLOWER, FUNCTIONS, SEQUEL, WRONG, checked, exchanged, table_of, written
+from tests.sim.workshop.strangers import FOLLOWER, FUNCTIONS, SEQUEL, checked, exchanged, table_of, written
 
 from limo_hog.cli.main import main
 from limo_sim.workshop.check import Verdict, examine
@@ -55,18 +55,15 @@ def test_a_fault_in_one_scene_is_told_with_that_scene(tmp_path: Path) -> None:
     verdicts = checked(tmp_path, exchanged(FOLLOWER, "self.commands.publish(Twist()) → [][1]"))
     assert verdicts[0].evidence.startswith("the room is empty: node.py failed with IndexError at 0.00 s")
     assert "so it does in 1 other scene" in verdicts[0].evidence
-    assert named(verdicts, "stands while").holds is False
-    assert named(verdicts, "turns towards").points == 10
+    assert (named(verdicts, "stands while").holds, named(verdicts, "turns towards").points) == (False, 10)
 
 
 def test_a_walk_that_fails_tells_why_and_what_was_wanted(tmp_path: Path) -> None:
     in_the_walk = "= self.speed → = 0.2 if self.get_clock().now().nanoseconds < 5e9 else [][1]"
     fails = named(checked(tmp_path, exchanged(FOLLOWER, in_the_walk)), "follows")
-    assert "a person walks for 20 s: node.py failed with IndexError" in fails.evidence
-    assert fails.line is not None
+    assert "a person walks for 20 s: node.py failed with IndexError" in fails.evidence and fails.line is not None
     loses = named(checked(tmp_path, exchanged(FOLLOWER, "self.gain * float → 0.0002 * float")), "follows")
-    assert "in_view is 0." in loses.evidence
-    assert "wanted 0.7 to 1" in loses.evidence
+    assert "in_view is 0." in loses.evidence and "wanted 0.7 to 1" in loses.evidence
 
 
 def test_a_crop_that_cannot_be_placed_is_judged_by_the_red_box(tmp_path: Path) -> None:
@@ -91,12 +88,6 @@ def test_a_forged_box_gains_nothing(tmp_path: Path) -> None:
     verdicts = checked(tmp_path, exchanged(FOLLOWER, forged))
     assert "is on nobody" in named(verdicts, "people are found").evidence
     assert by_task(verdicts)[2][0] == by_task(verdicts)[3][0] == 0
-
-
-def test_commands_that_the_robot_cannot_get_are_told_as_ros_tells_it(tmp_path: Path) -> None:
-    verdicts = checked(tmp_path, WRONG["any best effort commands"][1])
-    said = "requesting incompatible QoS. No messages will be sent to it. Last incompatible policy: RELIABILITY"
-    assert any(said in verdict.evidence for verdict in verdicts)
 
 
 def test_an_exercise_can_be_a_lecturers_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -177,14 +168,12 @@ def test_the_report_cites_a_frame_and_is_short(tmp_path: Path, capsys: pytest.Ca
     script.write_text(TURNS_AWAY)
     assert main(["workshop", "check", str(script), "--html", str(tmp_path / "page.html")]) == 1
     lines = capsys.readouterr().out.splitlines()
-    assert len(lines) < 24
-    assert max(map(len, lines)) <= 80
+    assert len(lines) < 24 and max(map(len, lines)) <= 80
     cited = "A person stands on the left<span>at 0.0 s: window “Camera”; 1 box found"
     assert (tmp_path / "page.html").read_text().count(cited) == 1
     script.write_text("import rclpy\n")
     assert main(["workshop", "check", str(script)]) == 1
-    out = capsys.readouterr().out
-    assert "– 11 checkpoints of task 2 to 4" in out
+    assert "– 11 checkpoints of task 2 to 4" in capsys.readouterr().out
     assert main(["workshop", "check", str(script), "--html", str(script)]) == 2
     assert script.read_text() == "import rclpy\n"
 

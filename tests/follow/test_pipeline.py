@@ -84,7 +84,7 @@ def test_a_period_begins_with_a_new_image_and_a_tenth_of_a_second_after_the_last
     ticks = [(0.0, first), (0.02, first), (0.06, second), (0.14, second), (0.16, second), (0.2, None), (0.26, None)]
     logs = [loop.tick(now, frame) for now, frame in ticks]
     assert [log and (log.time, log.frame) for log in logs] == [
-        *((0.0, first), None, (0.06, second), None, (0.16, None), None, (0.26, None)),
+        *((0.0, first), None, (0.06, second), None, (0.16, None), None, (0.26, None))
     ]
     # So does a clock that was set back.
     assert loop.tick(0.1, None) is not None

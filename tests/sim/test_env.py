@@ -144,18 +144,16 @@ def test_no_image_is_drawn_for_the_state(monkeypatch: pytest.MonkeyPatch) -> Non
         env.step(AHEAD)
 
 
-def test_a_state_carries_the_last_sighting_along_with_the_robot() -> None:
+def test_a_state_carries_the_last_sighting_along_and_the_velocity_of_many() -> None:
     seen = sighted(0.0, 2.0, 1.0, Odometry(1.0), None)
     turned = Odometry(3.0, x=1.0, y=0.0, yaw=math.pi / 2, linear=0.35, angular=-0.75)
     np.testing.assert_allclose(state_of(seen, False, 3.0, turned), [0, 0, -1, 1 / 8, 2 / 5, 0, 0, 0.5, -0.5], atol=1e-6)
     # No number leaves -1 … 1.
     rushing = Odometry(99.0, x=40.0, linear=9.0, angular=-9.0)
     assert state_of(seen, False, 99.0, rushing).tolist() == [0, -1, 0, 1, 1, 0, 0, 1, -1]
-
-
-def test_a_persons_velocity_is_that_of_many_sightings() -> None:
-    seen = None
-    for time in np.arange(60) / 10:
+    # A person's velocity is that of many sightings.
+    seen = sighted(0.0, 2.0, 0.0, Odometry(), None)
+    for time in np.arange(1, 60) / 10:
         x, y = 2.0 + 0.3 * time, 0.6 * time
         seen = sighted(math.atan2(y, x), math.hypot(x, y), time, Odometry(time), seen)
     state = state_of(seen, True, 5.9, Odometry(5.9))

@@ -123,13 +123,10 @@ def planned(points: list[tuple[float, float]], lookout: Lookout = LOOKOUT, at: f
     return lookout.step(hunt_for(np.array(points), at), BLIND, situated(free_ground()))
 
 
-def test_where_all_the_places_are_in_sight_it_turns_to_their_middle_and_stays() -> None:
+def test_where_all_places_are_in_sight_it_turns_to_them_and_chooses_anew_in_time() -> None:
     hunt = planned([(1.0, 1.0), (2.0, 1.0)])
     assert (len(hunt.way), hunt.planned) == (0, NOW)
     assert hunt.facing == pytest.approx((1.5, 1.0))
-
-
-def test_a_way_is_chosen_anew_after_eight_tenths_of_a_second() -> None:
     for ago, anew in ((0.75, False), (0.85, True)):
         assert (planned([(1.0, 1.0)], at=NOW - ago).planned == NOW) == anew
 

@@ -159,10 +159,15 @@ def test_another_critic_is_one_class_and_one_line() -> None:
     assert dict(polite.shares)["keep_right"] > 0
 
 
-def test_where_nothing_is_to_be_driven_to_it_does_not_drive_on_with_what_it_began() -> None:
+def test_what_it_began_is_not_gone_on_with_where_it_leads_nowhere() -> None:
     # It went out of a person's way, lost them, and looks for them to the left.
     plan = PLANNER.plan(situation(speed=0.8), Goal(0.5), Manoeuvre(0.0, 0.8))
     assert plan.twist.linear < 0.1 and plan.twist.angular > 0.5
+    # The wall ahead stops it; the person lost is looked for to the left.
+    seen = situation(points=[(0.5, y) for y in np.arange(-0.6, 0.61, 0.04)])
+    plan = PLANNER.plan(seen, Goal(0.45), Manoeuvre(0.0, 0.8))
+    assert plan.manoeuvre == DIRECT
+    assert PLANNER.plan(seen, Goal(0.45), plan.manoeuvre).twist.angular > 0.5
 
 
 def test_a_manoeuvre_begun_is_kept_for_all_that_it_costs_a_little_more() -> None:
@@ -179,14 +184,6 @@ def test_people_who_would_be_met_in_two_seconds_hardly_count() -> None:
     # They give way as well; a robot that takes them not to would stand.
     plan: Move = PLANNER.plan(situation((3.2, 0.2, -0.8, 0.0)), towards(6.0), DIRECT)
     assert plan.twist.linear > 0.3
-
-
-def test_a_manoeuvre_that_leads_nowhere_is_not_gone_on_with() -> None:
-    # The wall ahead stops it; the person lost is looked for to the left.
-    seen = situation(points=[(0.5, y) for y in np.arange(-0.6, 0.61, 0.04)])
-    plan = PLANNER.plan(seen, Goal(0.45), Manoeuvre(0.0, 0.8))
-    assert plan.manoeuvre == DIRECT
-    assert PLANNER.plan(seen, Goal(0.45), plan.manoeuvre).twist.angular > 0.5
 
 
 def test_in_mind_the_robot_brakes_no_faster_than_its_wheels_can() -> None:

@@ -130,14 +130,11 @@ def test_a_person_followed_first_is_learnt_once_they_are_confirmed_and_in_view()
     assert choose(Choice(3), unseen).likeness is None
 
 
-def test_a_track_counts_while_young_or_likely_or_confirmed() -> None:
+def test_a_track_counts_while_young_likely_or_confirmed_and_as_measured_for_a_while() -> None:
     assert SELECTION.is_candidate(unproved(1, 0.1, age=29))
     assert not SELECTION.is_candidate(unproved(1, 0.39, age=30))
     assert SELECTION.is_candidate(unproved(1, 0.41, age=30))
     assert SELECTION.is_candidate(plain(1, age=300))
-
-
-def test_people_count_as_measured_for_three_tenths_of_a_second() -> None:
     lately, before = replace(plain(1), seen=NOW - 0.25), replace(plain(2), seen=NOW - 0.35)
     weak = unproved(3, 0.2, age=40)
     assert SELECTION.measured(at(NOW, lately, before, weak)) == [lately]

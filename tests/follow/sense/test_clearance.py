@@ -105,11 +105,13 @@ def test_what_is_higher_than_5_cm_is_an_obstacle(height: float, seen: bool) -> N
     assert len(DepthGrid(step=1).points(depth, 448.6, 1.8, LIMO)) == (640 if seen else 0)
 
 
-def test_the_height_of_a_pixel_is_that_of_its_middle() -> None:
+def test_a_pixels_height_is_that_of_its_middle_and_depth_ends_at_the_reach() -> None:
     depth, height = flat(np.nan), 0.175 - 60.5 / 448.6
     depth[300, 5] = 1.0
     for floor, points in ((height - 2e-4, 1), (height + 2e-4, 0)):
         assert len(DepthGrid(step=1, floor=floor).points(depth, 448.6, 1.8, LIMO)) == points
+    assert len(DepthGrid().points(flat(1.5), 448.6, 1.5, LIMO)) == 0
+    assert len(DepthGrid().points(flat(0.0), 448.6, 1.5, LIMO)) == 0
 
 
 def test_the_pixels_looked_at_lie_8_apart_as_far_from_either_edge() -> None:
@@ -123,11 +125,6 @@ def test_the_pixels_looked_at_lie_8_apart_as_far_from_either_edge() -> None:
     edge[:5] = 1.0
     assert len(DepthGrid().points(edge, 448.6, 1.8, LIMO)) == 80
     assert len(DepthGrid().points(np.where(np.arange(480)[:, None] < 4, edge, np.nan), 448.6, 1.8, LIMO)) == 0
-
-
-def test_depth_of_exactly_the_reach_and_of_nothing_is_no_point() -> None:
-    assert len(DepthGrid().points(flat(1.5), 448.6, 1.5, LIMO)) == 0
-    assert len(DepthGrid().points(flat(0.0), 448.6, 1.5, LIMO)) == 0
 
 
 def test_every_pixel_looked_at_has_the_depth_of_its_own_row_and_column() -> None:

@@ -192,7 +192,7 @@ def test_a_person_is_hidden_by_what_is_before_their_window_s_middle_and_not_belo
         assert Visibility().expected(0.0, 2.0, 536.0, -120.0, view, confirmed=True) == found
 
 
-def test_what_the_images_edge_leaves_of_a_strip_counts() -> None:
+def test_what_the_images_edge_leaves_of_a_strip_counts_for_relief_and_outline() -> None:
     # Of 120 px the left strip is from -.46 to -.36 about column 50: its first five columns are out of the image.
     depth = flat(4.0)
     depth[:, :20] = 3.0
@@ -200,6 +200,11 @@ def test_what_the_images_edge_leaves_of_a_strip_counts() -> None:
     for image, left in ((depth, -10), (depth[:, ::-1], WIDTH - 110)):
         box = np.array([left, 120, 120, 240], np.int32)
         assert stands_out(image, box) == pytest.approx(2 / (1 / 3 + 1 / 4) - 2.0)
+    # The strip is ten pixels to either side of column 8.
+    depth = flat(8.0)
+    depth[150:330, :40] = 2.0
+    assert top_row(depth, np.array([-52, 120, 120, 240], np.int32), 2.0) == 150
+    assert top_row(depth[:, ::-1], np.array([WIDTH - 68, 120, 120, 240], np.int32), 2.0) == 150
 
 
 @pytest.mark.parametrize("unknown", [0.0, -0.5, np.nan, np.inf])
@@ -208,14 +213,6 @@ def test_unknown_pixels_change_no_relief_as_long_as_a_fifth_is_known(unknown: fl
     depth[:, 300:340] = 2.0
     depth[185:225] = unknown
     assert stands_out(depth, BOX) == pytest.approx(2.0)
-
-
-def test_an_outline_at_a_side_of_the_image_is_followed_in_what_is_left_of_its_strip() -> None:
-    # The strip is ten pixels to either side of column 8.
-    depth = flat(8.0)
-    depth[150:330, :40] = 2.0
-    assert top_row(depth, np.array([-52, 120, 120, 240], np.int32), 2.0) == 150
-    assert top_row(depth[:, ::-1], np.array([WIDTH - 68, 120, 120, 240], np.int32), 2.0) == 150
 
 
 @pytest.mark.parametrize("distance", [2.5, 3.3, 5.0])

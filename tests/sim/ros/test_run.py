@@ -195,10 +195,13 @@ def test_wrong_ros_arguments_say_what_is_wanted(run: Run, argument: str, said: s
     assert said in run(node(DRIVE, make), arguments=["--ros-args", "-p", argument]).failure
 
 
-def test_timers_keep_their_period_in_the_arenas_time(run: Run) -> None:
+def test_timers_keep_their_period_in_the_arenas_time_and_polling_lets_it_pass(run: Run) -> None:
     make = "self.create_timer(0.25, lambda: self.get_logger().info('tick'))"
     at = [at for at, _, _ in run(node("pass", make)).logged]
     assert at == pytest.approx([0.26, 0.5, 0.76, 1.0, 1.26, 1.5, 1.76], abs=1e-9)
+    text = "rclpy.init()\nn = Node('n')\npub = n.create_publisher(Twist, 'cmd_vel', 1)\nwhile rclpy.ok():\n"
+    text += "    rclpy.spin_once(n, timeout_sec=0)\n    pub.publish(Twist())"
+    assert len(run(text).stage.commands) == 101
 
 
 def test_colour_and_depth_are_paired_by_their_stamps(run: Run) -> None:
@@ -224,12 +227,6 @@ def test_every_topic_of_the_workshop_arrives_at_its_rate(run: Run) -> None:
         text += f"n.create_subscription(T, '{topic}', lambda m: n.get_logger().info('{topic}'), 100)\n"
     counts = Counter(topic for _, _, topic in run(text + "rclpy.spin(n)").logged)
     assert {topic: round(n / 2) for topic, n in counts.items()} == rates
-
-
-def test_polling_and_spinning_with_a_timeout_let_time_pass(run: Run) -> None:
-    text = "rclpy.init()\nn = Node('n')\npub = n.create_publisher(Twist, 'cmd_vel', 1)\nwhile rclpy.ok():\n"
-    text += "    rclpy.spin_once(n, timeout_sec=0)\n    pub.publish(Twist())"
-    assert len(run(text).stage.commands) == 101
 
 
 def test_a_callback_may_draw_on_its_picture_without_touching_anybody_elses(run: Run) -> None:

@@ -72,7 +72,7 @@ def network(path: Path, *layers: tuple[NDArray[np.float32], NDArray[np.float32]]
     return path
 
 
-def test_a_policy_is_a_network_with_tanh_whose_action_is_in_units_of_the_environments(tmp_path: Path) -> None:
+def test_a_policy_is_a_network_with_tanh_and_acts_in_units_of_the_environments(tmp_path: Path) -> None:
     random = np.random.default_rng(0)
     w0, w1, b0, b1 = (random.normal(size=size).astype(np.float32) for size in ((SIZE, 4), (4, 2), 4, 2))
     policy = controller_of(f"policy:{network(tmp_path / 'a.npz', (w0, b0), (w1, b1))}")

@@ -171,7 +171,7 @@ def test_a_model_keeps_the_share_of_its_fit_at_every_height(model: str, height: 
     assert abs(found.mean() - fit_of(model).kept(height)) < 0.03
 
 
-def test_a_model_misses_in_bursts_as_long_as_its_memory() -> None:
+def test_a_model_misses_in_bursts_of_its_memory_and_its_fit_grows_with_height() -> None:
     found = at_height(130, "opencv", 10_000)
     share, fit = found.mean(), fit_of("opencv")
     # P(missed twice) of two standard normals with this correlation: the bivariate normal integral, by quadrature.
@@ -181,6 +181,11 @@ def test_a_model_misses_in_bursts_as_long_as_its_memory() -> None:
     both = np.trapezoid(np.exp(-(z**2) / 2) / math.sqrt(2 * math.pi) * above, z)
     assert abs((~found[1:] & ~found[:-1]).mean() - both) < 0.02
     assert both > 1.3 * (1 - share) ** 2
+    heights = np.geomspace(64, 250, 30)
+    for fit in map(fit_of, ("opencv", "limo")):
+        assert all(np.diff([fit.photographs.at(height) for height in heights]) > 0)
+        assert all(0.0 < fit.kept(height) <= 1.0 for height in (0.0, *heights, 480.0))
+        assert fit.memory_s > 0
 
 
 def test_a_models_misses_and_false_boxes_are_those_of_the_seed() -> None:
@@ -190,14 +195,6 @@ def test_a_models_misses_and_false_boxes_are_those_of_the_seed() -> None:
     extra = [len(found) - found_of([found], 0)[0] - found_of([found], 1)[0] for found in frames]
     rate = fit_of("opencv").false_rate
     assert abs(np.mean(extra) - rate) < 4 * math.sqrt(rate / 10_000)
-
-
-def test_the_fits_are_probabilities_that_grow_with_the_height() -> None:
-    heights = np.geomspace(64, 250, 30)
-    for fit in map(fit_of, ("opencv", "limo")):
-        assert all(np.diff([fit.photographs.at(height) for height in heights]) > 0)
-        assert all(0.0 < fit.kept(height) <= 1.0 for height in (0.0, *heights, 480.0))
-        assert fit.memory_s > 0
 
 
 @pytest.fixture

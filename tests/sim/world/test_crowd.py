@@ -205,9 +205,12 @@ def test_a_person_who_yields_walks_round_a_mover() -> None:
     assert seen[-1].x > 3.8
 
 
-def test_the_way_is_straight_where_nothing_stands_in_it() -> None:
+def test_the_way_is_straight_where_nothing_stands_and_begins_without_the_margin() -> None:
     place, length = FloorPlan([Rectangle(0, 3, 1, 1)], 5.0, 0.3).way((-2, 0), (2, 1))
     assert place == (2, 1) and length == pytest.approx(math.hypot(4, 1))
+    place, length = FloorPlan([Rectangle(0, 0, 1, 1)], 5.0, 0.3).way((-1.1, 0), (1.1, 0))
+    assert place[0] == pytest.approx(-1.3, abs=0.01)
+    assert length < 2 * math.hypot(1.3, 0.2) + 2.7
 
 
 def test_the_way_round_a_square_or_disc_is_as_long_as_geometry_says() -> None:
@@ -224,12 +227,6 @@ def test_a_door_is_found_and_one_too_narrow_is_none() -> None:
         walls = [Rectangle(0, side * (2.5 + width / 2), 0.05, 2.5) for side in (-1, 1)]
         length = FloorPlan(walls, 5.0, 0.3).way((-2, 2), (2, 2))[1]
         assert math.isfinite(length) == passable
-
-
-def test_ways_within_the_margin_begin_without_it() -> None:
-    place, length = FloorPlan([Rectangle(0, 0, 1, 1)], 5.0, 0.3).way((-1.1, 0), (1.1, 0))
-    assert place[0] == pytest.approx(-1.3, abs=0.01)
-    assert length < 2 * math.hypot(1.3, 0.2) + 2.7
 
 
 def test_a_wall_hides_what_is_behind_it() -> None:

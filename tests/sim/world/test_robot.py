@@ -46,16 +46,13 @@ def test_the_robot_drives_the_circle_that_the_formula_says() -> None:
     assert arena.truth().robot == pytest.approx(expected, abs=0.01)
 
 
-def test_odometry_without_slip_agrees_with_the_truth_and_drifts_with_it() -> None:
+def test_odometry_starts_at_zero_agrees_with_the_truth_and_drifts_with_slip() -> None:
     arena = drive(Arena(EMPTY), 10.0, Twist(0.3, 0.2))
     wheels = arena.odometry()
     assert (wheels.x, wheels.y, wheels.yaw) == pytest.approx(arena.truth().robot, abs=0.02)
     slipping = drive(Arena(dataclasses.replace(EMPTY, odometry=Wheels(slip=0.3))), 10.0, Twist(0.3, 0.2))
     assert slipping.truth().robot == pytest.approx(arena.truth().robot)
     assert slipping.odometry().yaw != pytest.approx(wheels.yaw, abs=1e-3)
-
-
-def test_odometry_starts_at_zero_wherever_the_robot_stands() -> None:
     wheels = drive(Arena(placed(2.0, 1.0, 1.0)), 3.0, Twist(0.3, 0.0)).odometry()
     assert wheels.y == pytest.approx(0.0, abs=1e-9)
     assert wheels.x == pytest.approx(0.3 * 3 - 0.5 * 0.3**2, abs=0.01)

@@ -142,7 +142,7 @@ def test_bad_data_is_refused_with_file_key_and_range(tmp_path: Path, text: str, 
     assert isinstance(caught.value, LimoHogError)
 
 
-def test_a_missing_file_and_an_unknown_name_are_refused(tmp_path: Path) -> None:
+def test_a_missing_file_an_unknown_name_and_a_wrong_replacement_are_refused(tmp_path: Path) -> None:
     for name, told in (
         (tmp_path / "nowhere.toml", r"nowhere\.toml: cannot be read"),
         ("wrokshop", "unknown scenario wrokshop: want one of .*workshop, "),
@@ -150,9 +150,6 @@ def test_a_missing_file_and_an_unknown_name_are_refused(tmp_path: Path) -> None:
     ):
         with pytest.raises(ScenarioError, match=told):
             Scenario.load(name)
-
-
-def test_a_replaced_scenario_is_checked_when_the_arena_is_built() -> None:
     inside = dataclasses.replace(Scenario.load("followable"), furniture=(Furniture("cone", 0.1, 0.0),))
     with pytest.raises(ScenarioError, match="scenario 'followable': furniture"):
         Arena(inside, 0)

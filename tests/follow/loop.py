@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from tests.follow.views import boxes, flat, scan
+from tests.follow.views import boxes, flat, scan, there
 
 from limo_hog.detections import Detections
 from limo_hog.follow import (
@@ -14,6 +14,7 @@ from limo_hog.follow import (
     Follower,
     Frame,
     FrameLog,
+    Guard,
     Mode,
     Observation,
     Odometry,
@@ -62,13 +63,26 @@ class Loop:
         return self._follower.tick(now, frame, sensors)
 
     def frame(self, now: float, sensors: Sensors = SENSORS, depth: NDArray[np.float32] | None = DEPTH) -> FrameLog:
-        """What comes of an image."""
-        log = self.tick(now, Frame(now, IMAGE, FOCAL_PX, depth), sensors)
-        assert log is not None
-        return log
+        return there(self.tick(now, Frame(now, IMAGE, FOCAL_PX, depth), sensors))
 
     def between(self, now: float, turn: Scan | None = None, odometry: Odometry | None = None) -> Decision[None]:
         """The command of a control period without an image; the lidar hits nothing unless `turn` says otherwise."""
-        log = self.tick(now, None, Sensors(turn or scan(stamp=now), odometry or Odometry(now)))
-        assert log is not None
-        return log.decision
+        return there(self.tick(now, None, Sensors(turn or scan(stamp=now), odometry or Odometry(now)))).decision
+
+
+@dataclass(frozen=True)
+class Headstrong:
+    """Always wants the same."""
+
+    twist: Twist
+
+    def start(self) -> int:
+        return 0
+
+    def step(self, observation: Observation, state: int) -> Decision[int]:
+        del observation
+        return Decision(self.twist, state + 1, Mode.FOLLOW, "because")
+
+
+def ahead(speed: float = 0.5) -> Guard[int]:
+    return Guard(Headstrong(Twist(speed, 0.3)))

@@ -9,9 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.follow.loop import DEPTH, FOCAL_PX, IMAGE, Loop
-from tests.follow.safety.headstrong import Headstrong
-from tests.follow.views import scan, scan_of
+from tests.follow.loop import DEPTH, FOCAL_PX, IMAGE, Headstrong, Loop
+from tests.follow.views import scan, scan_of, there
 
 from limo_hog.follow import (
     LIMO,
@@ -31,10 +30,9 @@ TALL = RobotGeometry(half_length=0.25, half_width=0.2, camera_z=0.25, field_of_v
 
 
 def driven(robot: RobotGeometry, wanted: Twist, sensors: Sensors) -> tuple[Twist, str]:
-    """What a robot is told that is wanted to do something."""
-    log = Follower(Headstrong(wanted), Loop(), robot).tick(0.0, Frame(0.0, IMAGE, FOCAL_PX, DEPTH), sensors)
-    assert log is not None
-    return log.decision.twist, log.decision.reason
+    frame = Frame(0.0, IMAGE, FOCAL_PX, DEPTH)
+    decision = there(Follower(Headstrong(wanted), Loop(), robot).tick(0.0, frame, sensors)).decision
+    return decision.twist, decision.reason
 
 
 @pytest.mark.parametrize("page", ["docs/own-robot.md", "docs/follower.md", "examples/robot/robot.toml"])
@@ -47,6 +45,8 @@ def test_the_robots_of_the_pages_are_robots(page: str, tmp_path: Path) -> None:
 
 def test_a_file_names_what_differs_from_the_limo(tmp_path: Path) -> None:
     path = tmp_path / "tall.toml"
+    with pytest.raises(RobotError, match=r"tall\.toml: No such file or directory$"):
+        load_robot(path)
     path.write_text("half_length = 0.25\ncamera_z = 0.25\nmay_back = false\nmax_speed = 1\n")
     assert load_robot(path) == replace(LIMO, half_length=0.25, camera_z=0.25, may_back=False)
 
@@ -70,15 +70,13 @@ def test_a_wrong_file_is_refused_by_file_key_and_what_is_allowed(tmp_path: Path,
     assert why in str(refused.value)
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(RobotError, match=r"nowhere\.toml: No such file or directory$"):
-        load_robot(tmp_path / "nowhere.toml")
-
-
-def test_a_longer_robot_stops_earlier() -> None:
+def test_a_longer_robot_stops_earlier_and_one_of_weak_brakes_keeps_more_room() -> None:
     post = Sensors(scan_of([(0.80, 0.0)]), Odometry())
     assert driven(LIMO, Twist(0.5, 0.0), post)[0].linear > 0
     assert driven(replace(LIMO, half_length=0.25), Twist(0.5, 0.0), post)[0].linear == 0
+    post = Sensors(scan_of([(1.2, 0.0)]), Odometry())
+    speeds = [driven(replace(LIMO, acceleration=a), Twist(0.9, 0.0), post)[0].linear for a in (0.3, 1.0)]
+    assert 0 < speeds[0] < speeds[1] < 0.9
 
 
 def test_no_command_is_faster_than_the_robot_or_backs_one_that_may_not() -> None:
@@ -90,13 +88,7 @@ def test_no_command_is_faster_than_the_robot_or_backs_one_that_may_not() -> None
     assert driven(replace(LIMO, max_speed=0.1), Twist(-0.2, 0.0), free)[0] == Twist(-0.1, 0.0)
 
 
-def test_a_robot_of_weak_brakes_keeps_more_room() -> None:
-    post = Sensors(scan_of([(1.2, 0.0)]), Odometry())
-    speeds = [driven(replace(LIMO, acceleration=a), Twist(0.9, 0.0), post)[0].linear for a in (0.3, 1.0)]
-    assert 0 < speeds[0] < speeds[1] < 0.9
-
-
-def test_a_lidar_that_looks_backwards_guards_the_way_back_and_what_is_ahead_is_for_the_depth_image() -> None:
+def test_a_lidar_that_looks_backwards_guards_the_way_back_not_the_way_ahead() -> None:
     # The same beam, straight ahead of the lidar: 0.5 m off, ahead of a Limo and behind the other.
     turned = replace(LIMO, lidar_x=0.0, lidar_yaw=math.pi)
     ranges = np.full(292, np.inf, np.float32)

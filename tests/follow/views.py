@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,13 @@ from limo_hog.follow.sense.observation import Observation, Odometry, Scan
 WIDTH, HEIGHT, FOCAL = 640, 480, 448.6
 RED, GREEN, BLUE = (40, 40, 170), (50, 140, 50), (130, 50, 35)
 NOBODY = Detections.none()
+T = TypeVar("T")
+
+
+def there(one: T | None) -> T:
+    """Return what is there: somebody in the arena, a box in the image."""
+    assert one is not None
+    return one
 
 
 def boxes(*rows: tuple[int, int, int, int], scores: tuple[float, ...] | None = None) -> Detections:
@@ -36,7 +44,6 @@ def dressed(
 
 
 def flat(depth: float) -> NDArray[np.float32]:
-    """A depth image of one distance."""
     return np.full((HEIGHT, WIDTH), depth, np.float32)
 
 
@@ -63,7 +70,6 @@ def scan_of(points: list[tuple[float, float]], stamp: float = 0.0) -> Scan:
 
 
 def look(detections: Detections = NOBODY, stamp: float = 0.0) -> Observation:
-    """An observation with a camera alone."""
     return Observation(stamp, WIDTH, HEIGHT, FOCAL, detections)
 
 
@@ -93,12 +99,8 @@ class World:
         x, y, yaw = self.robot
         depth = self.distance * math.cos(self.bearing) - 0.084
         odometry = Odometry(self.time, x, y, yaw, self.told.linear, self.told.angular)
-        seen = replace(
-            look(stamp=self.time),
-            depth=flat(8.0),
-            scan=scan(stamp=self.time) if self.lidar else None,
-            odometry=odometry,
-        )
+        turn = scan(stamp=self.time) if self.lidar else None
+        seen = replace(look(stamp=self.time), depth=flat(8.0), scan=turn, odometry=odometry)
         if not visible or abs(self.bearing) > 0.55:
             return seen
         height = 0.9 * FOCAL / depth
@@ -109,7 +111,6 @@ class World:
         return replace(seen, detections=boxes(box, scores=(score,)), depth=before_wall(depth, box))  # type: ignore[arg-type]
 
     def drive(self, twist: Twist) -> None:
-        """Let a control period pass."""
         self.told = twist
         x, y, yaw = self.robot
         yaw += twist.angular * self.period

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from tests.follow.views import there as there
 
 from limo_hog.detections import Detections
 from limo_hog.follow.decision import Belief, Decision, Mode
@@ -79,14 +80,12 @@ def step(
 
 
 def followed(number: int, time: float | None = None) -> Step:
-    """A step in which the person is found and followed."""
     return step(number, person(), boxes=[ON], target=0, time=time)
 
 
 def card(
     *steps: Step, target: float | None = 1.5, contacts: Contacts = TOUCHED, criteria: Criteria | None = None
 ) -> ScoreCard:
-    """The score card of these steps."""
     scenario = Scenario.load("two_people")
     scorer = Scorer(scenario, criteria or CRITERIA)
     add(scorer, steps)
@@ -112,9 +111,6 @@ def figures(card: ScoreCard) -> dict[str, Any]:
     for name in WALL_CLOCK:
         assert told.pop(name) is not None
     return told
-
-
-T = TypeVar("T")
 
 
 def kept_in(steps: list[Step]) -> Callable[[Step], None]:
@@ -149,9 +145,3 @@ def poses_of(
         crowd.advance(step * STEP_S, robot)
         seen.append(crowd.poses)
     return seen
-
-
-def there(one: T | None) -> T:
-    """Return what is there: somebody in the arena, a box in the image."""
-    assert one is not None
-    return one

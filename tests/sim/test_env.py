@@ -29,7 +29,6 @@ STANDING = Scenario(people=(Person(route=((2.5, 0.0, 0.0),)),))
 
 
 def begun(scenario: Any = "workshop", observe: str = "state", seed: int = 0) -> LimoFollowV1:
-    """Return an environment at the beginning of an episode."""
     env = LimoFollowV1(scenario, observe)
     env.reset(seed=seed)
     return env
@@ -51,8 +50,7 @@ def test_it_is_made_by_name_and_gymnasiums_checker_accepts_it_without_a_warning(
 
 def test_an_action_is_in_units_of_the_tracking_controllers_limits() -> None:
     env = begun(Scenario(people=(Person(route=((-2.5, 0.0, 0.0),)),)))
-    for _ in range(10):
-        state = env.step(np.array([0.5, 0.0], np.float32))[0]
+    state = [env.step(np.array([0.5, 0.0], np.float32))[0] for _ in range(10)][-1]
     assert state[7] == pytest.approx(0.5, abs=1e-6)
     assert env._running().odometry().linear == pytest.approx(0.35)
 
@@ -65,9 +63,9 @@ def test_an_action_out_of_its_range_is_refused_by_name(action: Any) -> None:
 
 
 def test_wrong_words_and_faults_beside_images_are_refused_by_name() -> None:
+    unkind = replace(STANDING, name="unkind", detector=DetectorFaults(recall=0.5))
     with pytest.raises(ScenarioError, match="observe: got 'depth', want one of camera, gray, state"):
         LimoFollowV1(observe="depth")
-    unkind = replace(STANDING, name="unkind", detector=DetectorFaults(recall=0.5))
     with pytest.raises(ScenarioError, match=r"'unkind': detector: .*observe the state"):
         LimoFollowV1(unkind, "gray")
     with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
@@ -88,8 +86,7 @@ def test_turning_towards_the_person_earns_more_from_every_bearing(surface: float
 def test_a_step_towards_the_distance_earns_more_from_everywhere(bearing: float) -> None:
     beyond = [follow(bearing, surface) for surface in np.linspace(1.5, 12.0, 200)]
     before = [follow(bearing, surface) for surface in np.linspace(0.0, 1.5, 50)]
-    assert (np.diff(beyond) < -1e-7).all()
-    assert (np.diff(before) > 1e-7).all()
+    assert (np.diff(beyond) < -1e-7).all() and (np.diff(before) > 1e-7).all()
 
 
 def test_the_best_reward_is_one_and_contacts_and_changes_of_the_action_cost() -> None:
@@ -101,21 +98,18 @@ def test_the_best_reward_is_one_and_contacts_and_changes_of_the_action_cost() ->
     assert second == pytest.approx(-0.3 * SHAPING.effort)
 
 
-def test_touching_the_person_ends_the_episode() -> None:
+def test_touching_the_person_ends_the_episode_and_a_contact_with_the_wall_costs_once() -> None:
     env, terminated, steps = begun(Scenario(people=(Person(route=((1.2, 0.0, 0.0),)),))), False, 0
     while not terminated and steps < 30:
         _, reward, terminated, _, _ = env.step(np.array([1.0, 0.0], np.float32))
         steps += 1
     assert terminated
     assert reward < -SHAPING.person_contact + 1
-
-
-def test_a_contact_with_the_wall_costs_once_and_the_episode_goes_on() -> None:
     env = begun(Scenario(robot=Robot(x=4.5)))
-    steps = [env.step(AHEAD) for _ in range(20)]
-    costs = [info["reward"]["contact"] for *_, info in steps]
+    goes_on = [env.step(AHEAD) for _ in range(20)]
+    costs = [info["reward"]["contact"] for *_, info in goes_on]
     assert sum(costs) == min(costs) == -SHAPING.wall_contact
-    assert not any(terminated for _, _, terminated, _, _ in steps)
+    assert not any(terminated for _, _, terminated, _, _ in goes_on)
 
 
 def run(seed: int, observe: str = "state") -> list[Any]:
@@ -150,23 +144,16 @@ def test_no_image_is_drawn_for_the_state(monkeypatch: pytest.MonkeyPatch) -> Non
         env.step(AHEAD)
 
 
-def test_a_detector_that_finds_nobody_leaves_the_state_without_a_sighting() -> None:
-    state, _ = LimoFollowV1(replace(STANDING, detector=DetectorFaults(recall=0.0))).reset(seed=0)
-    assert state.tolist() == [0, 0, 0, 1, 1, 0, 0, 0, 0]
-
-
-def test_a_state_carries_the_last_sighting_along_with_the_robot() -> None:
+def test_a_state_carries_the_last_sighting_along_and_the_velocity_of_many() -> None:
     seen = sighted(0.0, 2.0, 1.0, Odometry(1.0), None)
     turned = Odometry(3.0, x=1.0, y=0.0, yaw=math.pi / 2, linear=0.35, angular=-0.75)
     np.testing.assert_allclose(state_of(seen, False, 3.0, turned), [0, 0, -1, 1 / 8, 2 / 5, 0, 0, 0.5, -0.5], atol=1e-6)
     # No number leaves -1 … 1.
     rushing = Odometry(99.0, x=40.0, linear=9.0, angular=-9.0)
     assert state_of(seen, False, 99.0, rushing).tolist() == [0, -1, 0, 1, 1, 0, 0, 1, -1]
-
-
-def test_a_persons_velocity_is_that_of_many_sightings() -> None:
-    seen = None
-    for time in np.arange(60) / 10:
+    # A person's velocity is that of many sightings.
+    seen = sighted(0.0, 2.0, 0.0, Odometry(), None)
+    for time in np.arange(1, 60) / 10:
         x, y = 2.0 + 0.3 * time, 0.6 * time
         seen = sighted(math.atan2(y, x), math.hypot(x, y), time, Odometry(time), seen)
     state = state_of(seen, True, 5.9, Odometry(5.9))
@@ -175,12 +162,11 @@ def test_a_persons_velocity_is_that_of_many_sightings() -> None:
 
 def test_a_glimpse_is_what_the_camera_shows() -> None:
     # The truth of the rendered image is the judge, over places before, beside and behind the robot.
-    random = np.random.default_rng(1)
-    errors = []
+    random, errors = np.random.default_rng(1), []
     for _ in range(40):
         bearing, distance = random.uniform(-1.0, 1.0), random.uniform(0.8, 4.2)
-        place = (distance * math.cos(bearing), distance * math.sin(bearing))
-        arena = Arena(Scenario(people=(Person(route=((*place, 0.0),)),)))
+        route = ((distance * math.cos(bearing), distance * math.sin(bearing), 0.0),)
+        arena = Arena(Scenario(people=(Person(route=route),)))
         truth = there(arena.truth().people[0])
         seen = there(glimpse(arena.plan(), arena.scenario, 0, hiding(arena.scenario)))
         assert (seen.distance, seen.bearing) == pytest.approx((truth.distance, truth.bearing))
@@ -211,6 +197,11 @@ def test_a_glimpse_is_the_same_wherever_both_are(place: tuple[float, float], blo
         assert astuple(seen(*robot)) == pytest.approx(astuple(here))
 
 
+def seen_at(x: float, y: float, **stands: Any) -> Glimpse:
+    scenario = replace(STANDING, **stands)
+    return there(glimpse(Plan(0.0, (0.0, 0.0, 0.0), (Pose(x, y, math.pi),)), scenario, 0, hiding(scenario)))
+
+
 @pytest.mark.parametrize(
     ("hides", "hidden"),
     [
@@ -227,11 +218,6 @@ def test_a_person_behind_a_wall_or_a_pillar_is_not_seen(hides: Wall | Furniture,
     seen = seen_at(2.5, 0.0, **{"walls" if isinstance(hides, Wall) else "furniture": (hides,)})
     assert (seen.visible == 0.0) == hidden
     assert seen.found != hidden
-
-
-def seen_at(x: float, y: float, **stands: Any) -> Glimpse:
-    scenario = replace(STANDING, **stands)
-    return there(glimpse(Plan(0.0, (0.0, 0.0, 0.0), (Pose(x, y, math.pi),)), scenario, 0, hiding(scenario)))
 
 
 @pytest.mark.parametrize(
@@ -263,15 +249,12 @@ def test_a_motion_faster_than_the_actions_is_cut_off_at_one(share: float, monkey
     assert motion.tolist() == pytest.approx([min(max(share, -1.0), 1.0)] * 2)
 
 
-def test_the_scan_is_the_distance_to_what_it_hits_and_eight_where_it_hits_nothing() -> None:
+def test_the_scan_reaches_to_eight_metres_and_depth_that_is_unknown_is_0(monkeypatch: pytest.MonkeyPatch) -> None:
     walled = Scenario(walls=(Wall((1.5, -0.5), (1.5, 0.5)),))
     scan = LimoFollowV1(walled, "camera").reset(seed=0)[0]["scan"]
     assert scan[146] == pytest.approx(1.5 - LIMO.lidar_x, abs=0.1)
     # Beside it the arena ends further off.
     assert 2.0 < scan[60:100].min() <= scan.max() <= 8.0
-
-
-def test_depth_that_is_unknown_or_out_of_range_is_0(monkeypatch: pytest.MonkeyPatch) -> None:
     env = begun(STANDING, "camera")
     frame = env._running().frame()
     depth = frame.depth.copy()
@@ -285,6 +268,9 @@ def test_the_state_is_of_the_scenarios_first_person(others: tuple[tuple[float, f
     people = tuple(Person(route=((*place, 0.0),)) for place in ((2.5, 0.0), *others))
     state, _ = LimoFollowV1(Scenario(people=people)).reset(seed=0)
     np.testing.assert_allclose(state[:5], [1, 1, 0, 2.5 / 8, 0], atol=0.03)
+    # A detector that finds nobody leaves it without a sighting.
+    blind, _ = LimoFollowV1(Scenario(people=people, detector=DetectorFaults(recall=0.0))).reset(seed=0)
+    assert blind.tolist() == [0, 0, 0, 1, 1, 0, 0, 0, 0]
 
 
 def test_the_depth_image_may_be_as_deep_as_a_scenario_may_ask_for() -> None:

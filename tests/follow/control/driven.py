@@ -23,14 +23,11 @@ NOW = 5.0
 
 
 def run(world: World, seconds: float, state: TrackingState | None = None, **seen: bool) -> Decision[TrackingState]:
-    """Let the controller drive the world's robot."""
-    decision = None
     state = state or CONTROLLER.start()
     for _ in range(round(seconds / world.period)):
         decision = CONTROLLER.step(world.observe(**seen), state)
         state = decision.state
         world.drive(decision.twist)
-    assert decision is not None
     return decision
 
 

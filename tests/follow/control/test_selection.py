@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from tests.follow.tracks.people import IN_RED, WINDOW
 from tests.follow.tracks.wearers import at, person
+from tests.follow.views import there
 
 from limo_hog.follow.control.selection import Choice, Selection
 from limo_hog.follow.tracks.identity import Likeness, Traits
@@ -74,8 +75,7 @@ def test_after_four_seconds_the_likelier_of_two_is_taken_and_is_as_likely_as_not
         assert (after.candidates == ()) == decided
         if decided:
             assert (after.number, after.measured) == (2, NOW - 1.0)
-            assert after.likeness is not None
-            assert after.likeness.chances == ((2, 0.5),)
+            assert there(after.likeness).chances == ((2, 0.5),)
         else:
             assert (after.number, after.unsure_at) == (1, since)
 
@@ -117,8 +117,7 @@ def test_after_twenty_seconds_anybody_is_followed_and_learnt_anew() -> None:
     for lost_s, number in ((19.9, 1), (20.1, 2)):
         after = choose(Choice(1, known(two=0.02), NOW - lost_s), plain(2))
         assert after.number == number
-        assert after.likeness is not None
-        assert (after.likeness.traits.number == 2) == (number == 2)
+        assert (there(after.likeness).traits.number == 2) == (number == 2)
         assert after.measured == (NOW if number == 2 else NOW - lost_s)
 
 
@@ -126,20 +125,16 @@ def test_a_person_followed_first_is_learnt_once_they_are_confirmed_and_in_view()
     first = choose(Choice(), unproved(3, 0.7))
     assert (first.number, first.likeness, first.measured) == (3, None, None)
     known_as = choose(first, plain(3))
-    assert known_as.likeness is not None
-    assert (known_as.number, known_as.measured) == (3, NOW)
+    assert (known_as.number, known_as.measured, known_as.likeness is None) == (3, NOW, False)
     unseen = replace(plain(3), seen=NOW - 0.5)
     assert choose(Choice(3), unseen).likeness is None
 
 
-def test_a_track_counts_while_young_or_likely_or_confirmed() -> None:
+def test_a_track_counts_while_young_likely_or_confirmed_and_as_measured_for_a_while() -> None:
     assert SELECTION.is_candidate(unproved(1, 0.1, age=29))
     assert not SELECTION.is_candidate(unproved(1, 0.39, age=30))
     assert SELECTION.is_candidate(unproved(1, 0.41, age=30))
     assert SELECTION.is_candidate(plain(1, age=300))
-
-
-def test_people_count_as_measured_for_three_tenths_of_a_second() -> None:
     lately, before = replace(plain(1), seen=NOW - 0.25), replace(plain(2), seen=NOW - 0.35)
     weak = unproved(3, 0.2, age=40)
     assert SELECTION.measured(at(NOW, lately, before, weak)) == [lately]
@@ -188,7 +183,7 @@ def test_a_word_takes_the_person_meant_once_people_were_looked_at_for_a_second()
     assert (after.number, after.likeness is not None, after.asked) == (2, True, None)
 
 
-def test_until_the_person_asked_for_is_in_view_nobody_else_is_begun_with_and_nobody_is_left() -> None:
+def test_until_the_person_asked_for_is_in_view_nobody_is_begun_with_and_nobody_left() -> None:
     assert choose(Choice(asked=7), plain(1)).number is None
     follows = Choice(1, known(one=1.0), NOW)
     for asked in (7, "left"):

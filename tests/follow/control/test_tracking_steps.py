@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.follow.control.driven import CONTROLLER, GRID, NOW, blocked, likely, run, someone, state, view
-from tests.follow.views import World, flat, scan_of
+from tests.follow.views import World, flat, scan_of, there
 
 from limo_hog.follow import Decision, Mode, Observation, Odometry
 from limo_hog.follow.control.rollouts import DIRECT
@@ -28,7 +28,6 @@ def step(own: int, *people: Person, seen: Observation | None = None, **known: An
 
 
 def keeps(one: Person, **known: Any) -> float | None:
-    """The distance that is kept to a person."""
     return step(1, one, **known).belief.keeps
 
 
@@ -77,8 +76,7 @@ def test_part_of_the_image_is_searched_for_a_person_who_is_surely_the_one() -> N
 def test_the_part_searched_is_around_where_the_person_will_be_in_the_next_frame(yaw: float) -> None:
     # A tenth of a second on: at 1 m/s across, .1 m to the left of where they are.
     pose = Odometry(NOW, yaw=yaw)
-    region = step(1, someone(1, 3.0, 0.0, 0.0, 1.0, window=500.0), seen=replace(view(), odometry=pose)).region
-    assert region is not None
+    region = there(step(1, someone(1, 3.0, 0.0, 0.0, 1.0, window=500.0), seen=replace(view(), odometry=pose)).region)
     column = 320 - 448.6 * math.tan(math.atan2(0.1, 3.0) - yaw)
     half = 500.0 / 3.0 / 2
     assert region.x == pytest.approx(column - half, abs=16.5)
@@ -93,17 +91,16 @@ def mapped(*, shown: bool, wall: float | None = None) -> Ground:
         seen = replace(world.observe(visible=shown), scan=legs)
         known = CONTROLLER.step(seen if wall is None else replace(seen, depth=flat(wall)), known).state
         world.time += world.period
-    assert known.ground is not None
-    return known.ground
+    return there(known.ground)
 
 
 def test_people_are_no_part_of_the_map_and_what_the_depth_image_shows_is() -> None:
     legs = np.array([(2.05, 0.05)])
     for shown in (True, False):
         assert GRID.is_blocked(mapped(shown=shown), legs)[0] != shown
-    for far, there in ((3.0, True), (3.6, False)):
+    for far, stands in ((3.0, True), (3.6, False)):
         found = GRID.is_blocked(mapped(shown=False, wall=far), np.array([(far + 0.084, 0.5 * far / 3)]))
-        assert found[0] == there
+        assert found[0] == stands
 
 
 def test_people_who_come_are_given_way_to_whether_they_are_followed_or_not() -> None:
@@ -173,9 +170,7 @@ def reason_after(seconds: float, *, pillar: bool = False) -> str:
     """What is done, of whose place no map tells, after a person was not measured for so long [s]."""
     world = World(lidar=False)
     known = run(world, 2.0).state
-    one = known.tracks.person(known.choice.number)
-    assert one is not None
-    world.time = one.measured + seconds
+    world.time = there(known.tracks.person(known.choice.number)).measured + seconds
     # The depth image shows something nearer, so that it is no wonder that the camera finds nobody.
     seen = replace(world.observe(visible=False), depth=flat(0.5))
     if pillar:
@@ -206,8 +201,7 @@ def searched(*, scan: bool = True, **other: Any) -> Decision[TrackingState]:
 
 def test_a_lost_person_is_looked_for_where_they_can_be_with_a_map_and_a_scan() -> None:
     looks = searched()
-    assert looks.mode is Mode.LOST
-    assert looks.state.hunt is not None
+    assert looks.mode is Mode.LOST and looks.state.hunt is not None
     assert len(looks.belief.places) == 150
     assert "searching for" not in looks.reason
     # Else, and after a minute, it turns in place.

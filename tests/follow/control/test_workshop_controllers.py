@@ -3,29 +3,33 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from tests.follow.views import NOBODY, boxes, flat, look
 
 from limo_hog.exceptions import LimoHogError
-from limo_hog.follow import ApproachController, Mode, ProxemicController, Twist, Zone, controller_named, zone_of
+from limo_hog.follow import (
+    ApproachController,
+    Controller,
+    Mode,
+    ProxemicController,
+    Twist,
+    Zone,
+    controller_named,
+    zone_of,
+)
 from limo_hog.follow.sense.measurement import person_depth
 
 
-def test_both_stop_when_nobody_is_seen() -> None:
-    for controller in (ApproachController(), ProxemicController()):
-        decision = controller.step(look(NOBODY), controller.start())
-        assert decision.twist == Twist()
-        assert decision.mode is Mode.SEARCH
-        assert decision.target is None
-
-
-def test_a_person_who_is_gone_is_lost() -> None:
-    for controller in (ApproachController(), ProxemicController()):
-        for depth in (None, flat(2.0)):
-            seen = controller.step(replace(look(boxes((300, 100, 60, 120))), depth=depth), controller.start())
-            assert controller.step(look(NOBODY), seen.state).mode is Mode.LOST
+@pytest.mark.parametrize("controller", [ApproachController(), ProxemicController()])
+def test_both_stop_when_nobody_is_seen_and_a_person_who_is_gone_is_lost(controller: Controller[Any]) -> None:
+    decision = controller.step(look(NOBODY), controller.start())
+    assert (decision.twist, decision.mode, decision.target) == (Twist(), Mode.SEARCH, None)
+    for depth in (None, flat(2.0)):
+        seen = controller.step(replace(look(boxes((300, 100, 60, 120))), depth=depth), controller.start())
+        assert controller.step(look(NOBODY), seen.state).mode is Mode.LOST
 
 
 @pytest.mark.parametrize(("cx", "angular"), [(320, 0.0), (301, 0.0), (300, 0.1), (340, -0.1), (120, 1.0), (520, -1.0)])

@@ -54,7 +54,6 @@ def _value(name: str, shape: tuple[int, ...]) -> bytes:
 
 
 def dark_cells() -> bytes:
-    """The network as the bytes of an ONNX file."""
     cells = SIZE // CELL
     weights = np.full((1, 3, CELL, CELL), -2.2 / (3 * CELL * CELL), np.float32)
     bias = np.ones(1, np.float32)

@@ -24,8 +24,6 @@ from limo_hog.follow.sense.clearance import (
 from limo_hog.follow.sense.observation import Odometry
 
 MARGIN = Margin(0.5, 0.2)
-
-
 #: Posts of a door 2 m wide.
 POSTS = np.array([[1.0, 1.0], [1.0, -1.0]])
 
@@ -68,9 +66,8 @@ def test_the_room_ahead_of_a_turned_robot_is_that_of_points_turned_the_other_way
 @pytest.mark.parametrize("speed", [0.05, 0.3, 0.7, 1.4])
 @pytest.mark.parametrize("braking", [0.3, 0.5, 2.0])
 def test_at_the_allowed_speed_the_robot_stops_within_its_room(speed: float, braking: float) -> None:
-    reaction = 0.25
-    stopping = speed * reaction + speed**2 / (2 * braking)
-    assert speed_within(stopping, braking, reaction) == pytest.approx(speed)
+    stopping = speed * 0.25 + speed**2 / (2 * braking)
+    assert speed_within(stopping, braking, 0.25) == pytest.approx(speed)
 
 
 def test_without_room_the_robot_stands_and_without_obstacle_nothing_limits_it() -> None:
@@ -99,13 +96,7 @@ def test_ranges_within_the_lidars_limits_are_points() -> None:
         assert len(scan_points(replace(scan(np.array(ranges, np.float32)), range_min=0.125), LIMO)) == points
 
 
-def test_the_floor_is_no_obstacle() -> None:
-    rows = np.arange(480, dtype=np.float32)[:, None] + 0.5 - 240
-    floor = np.where(rows > 0, 0.175 * 448.6 / np.maximum(rows, 0.5), np.inf).astype(np.float32)
-    assert len(DepthGrid().points(np.broadcast_to(floor, (480, 640)), 448.6, 1.8, LIMO)) == 0
-
-
-@pytest.mark.parametrize(("height", "seen"), [(0.03, False), (0.08, True)])
+@pytest.mark.parametrize(("height", "seen"), [(0.0, False), (0.03, False), (0.08, True)])
 def test_what_is_higher_than_5_cm_is_an_obstacle(height: float, seen: bool) -> None:
     # At 1 m, a pixel is 1 / 448.6 m high; the camera is 0.175 m above the floor.
     row = round(239.5 + (0.175 - height) * 448.6)
@@ -114,12 +105,13 @@ def test_what_is_higher_than_5_cm_is_an_obstacle(height: float, seen: bool) -> N
     assert len(DepthGrid(step=1).points(depth, 448.6, 1.8, LIMO)) == (640 if seen else 0)
 
 
-def test_the_height_of_a_pixel_is_that_of_its_middle() -> None:
-    depth = flat(np.nan)
+def test_a_pixels_height_is_that_of_its_middle_and_depth_ends_at_the_reach() -> None:
+    depth, height = flat(np.nan), 0.175 - 60.5 / 448.6
     depth[300, 5] = 1.0
-    height = 0.175 - 60.5 / 448.6
-    assert len(DepthGrid(step=1, floor=height - 2e-4).points(depth, 448.6, 1.8, LIMO)) == 1
-    assert len(DepthGrid(step=1, floor=height + 2e-4).points(depth, 448.6, 1.8, LIMO)) == 0
+    for floor, points in ((height - 2e-4, 1), (height + 2e-4, 0)):
+        assert len(DepthGrid(step=1, floor=floor).points(depth, 448.6, 1.8, LIMO)) == points
+    assert len(DepthGrid().points(flat(1.5), 448.6, 1.5, LIMO)) == 0
+    assert len(DepthGrid().points(flat(0.0), 448.6, 1.5, LIMO)) == 0
 
 
 def test_the_pixels_looked_at_lie_8_apart_as_far_from_either_edge() -> None:
@@ -133,11 +125,6 @@ def test_the_pixels_looked_at_lie_8_apart_as_far_from_either_edge() -> None:
     edge[:5] = 1.0
     assert len(DepthGrid().points(edge, 448.6, 1.8, LIMO)) == 80
     assert len(DepthGrid().points(np.where(np.arange(480)[:, None] < 4, edge, np.nan), 448.6, 1.8, LIMO)) == 0
-
-
-def test_depth_of_exactly_the_reach_and_of_nothing_is_no_point() -> None:
-    assert len(DepthGrid().points(flat(1.5), 448.6, 1.5, LIMO)) == 0
-    assert len(DepthGrid().points(flat(0.0), 448.6, 1.5, LIMO)) == 0
 
 
 def test_every_pixel_looked_at_has_the_depth_of_its_own_row_and_column() -> None:
@@ -157,11 +144,3 @@ def test_points_go_to_the_odometry_frame_and_back() -> None:
     assert ahead == pytest.approx([1 + math.cos(math.radians(30)), 2.5])
     assert left == pytest.approx([0.5, 2 + math.cos(math.radians(30))])
     assert from_odometry(np.stack([ahead, left]), pose) == pytest.approx(np.eye(2))
-
-
-def test_a_depth_pixel_becomes_a_point_of_the_base_frame() -> None:
-    depth = flat(np.nan)
-    depth[100, 500] = 1.2
-    (point,) = DepthGrid(step=1).points(depth, 448.6, 1.8, LIMO)
-    assert point == pytest.approx([0.084 + 1.2, (320 - 500.5) / 448.6 * 1.2], abs=1e-6)
-    assert len(DepthGrid(step=1).points(depth, 448.6, 1.1, LIMO)) == 0

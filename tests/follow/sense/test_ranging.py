@@ -1,16 +1,18 @@
-"""How far a box is, by the depth image: a median, where pixels are unknown and where the image ends."""
+"""How far a box is by the depth image, where pixels are unknown and the image ends; and the part searched next."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.follow.views import FOCAL, HEIGHT, WIDTH, boxes, flat, look
+from tests.follow.views import FOCAL, HEIGHT, WIDTH, boxes, flat, look, there
 
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.measurement import (
     Measurement,
+    RegionSize,
     Visibility,
     measure,
     median,
@@ -64,9 +66,12 @@ def test_a_box_is_low_whose_middle_is_below_the_persons(centre: float, low: bool
     assert Measurement(0.0, 2.0, 120, centre, 1.0, window=240.0, middle=0.0).is_low(0.1) == low
 
 
-def test_a_window_just_as_high_as_the_models_is_expected() -> None:
+def test_a_window_as_high_as_the_models_is_expected_and_grows_until_three_decimetres() -> None:
     for height, found in ((128.0, True), (127.9, False)):
         assert Visibility().expected(0.0, 4.0, 4.0 * height, 0.0, look(), confirmed=True) == found
+    # The model's window is 128 px high: 38.4 px at 1 m.
+    for window, found in ((39.0, True), (38.0, False)):
+        assert Visibility().expected(0.0, 0.1, window, 0.0, look(), confirmed=False) == found
 
 
 def test_the_depth_of_a_box_is_that_of_a_square_of_twenty_pixels_in_its_middle() -> None:
@@ -142,9 +147,7 @@ def test_a_strip_of_which_a_fifth_is_known_is_known() -> None:
         depth[:, 300:340] = 2.0
         depth[185:240, 265:277] = np.nan
         depth[185 : 185 + rows, 265:277] = 4.0
-        relief = stands_out(depth, BOX)
-        assert relief is not None
-        assert (relief == pytest.approx(2.0)) == known
+        assert (there(stands_out(depth, BOX)) == pytest.approx(2.0)) == known
 
 
 def test_an_outline_at_one_edge_of_the_image_stands_out_from_the_other_side_alone() -> None:
@@ -189,22 +192,19 @@ def test_a_person_is_hidden_by_what_is_before_their_window_s_middle_and_not_belo
         assert Visibility().expected(0.0, 2.0, 536.0, -120.0, view, confirmed=True) == found
 
 
-def test_nearer_than_three_decimetres_a_window_grows_no_more() -> None:
-    # The model's window is 128 px high: 38.4 px at 1 m.
-    for window, found in ((39.0, True), (38.0, False)):
-        assert Visibility().expected(0.0, 0.1, window, 0.0, look(), confirmed=False) == found
-
-
-def test_what_the_images_edge_leaves_of_a_strip_counts() -> None:
+def test_what_the_images_edge_leaves_of_a_strip_counts_for_relief_and_outline() -> None:
     # Of 120 px the left strip is from -.46 to -.36 about column 50: its first five columns are out of the image.
-    for mirrored in (False, True):
-        depth = flat(4.0)
-        depth[:, :20] = 3.0
-        depth[:, 43:57] = 2.0
-        box = np.array([-10, 120, 120, 240], np.int32)
-        if mirrored:
-            depth, box[0] = depth[:, ::-1], WIDTH - 110
-        assert stands_out(depth, box) == pytest.approx(2 / (1 / 3 + 1 / 4) - 2.0)
+    depth = flat(4.0)
+    depth[:, :20] = 3.0
+    depth[:, 43:57] = 2.0
+    for image, left in ((depth, -10), (depth[:, ::-1], WIDTH - 110)):
+        box = np.array([left, 120, 120, 240], np.int32)
+        assert stands_out(image, box) == pytest.approx(2 / (1 / 3 + 1 / 4) - 2.0)
+    # The strip is ten pixels to either side of column 8.
+    depth = flat(8.0)
+    depth[150:330, :40] = 2.0
+    assert top_row(depth, np.array([-52, 120, 120, 240], np.int32), 2.0) == 150
+    assert top_row(depth[:, ::-1], np.array([WIDTH - 68, 120, 120, 240], np.int32), 2.0) == 150
 
 
 @pytest.mark.parametrize("unknown", [0.0, -0.5, np.nan, np.inf])
@@ -215,9 +215,38 @@ def test_unknown_pixels_change_no_relief_as_long_as_a_fifth_is_known(unknown: fl
     assert stands_out(depth, BOX) == pytest.approx(2.0)
 
 
-def test_an_outline_at_a_side_of_the_image_is_followed_in_what_is_left_of_its_strip() -> None:
-    # The strip is ten pixels to either side of column 8.
-    depth = flat(8.0)
-    depth[150:330, :40] = 2.0
-    assert top_row(depth, np.array([-52, 120, 120, 240], np.int32), 2.0) == 150
-    assert top_row(depth[:, ::-1], np.array([WIDTH - 68, 120, 120, 240], np.int32), 2.0) == 150
+@pytest.mark.parametrize("distance", [2.5, 3.3, 5.0])
+@pytest.mark.parametrize("bearing", [-0.45, -0.1, 0.0, 0.2, 0.5])
+def test_a_region_holds_the_window_and_half_a_window_to_either_side(bearing: float, distance: float) -> None:
+    region, height = there(RegionSize().around(bearing, distance, 536.0, -120.0, look())), 536.0 / distance
+    x, y = 320 - FOCAL * math.tan(bearing), 240 - 120.0 / distance
+    spare = {
+        "left": max(x - height / 2, 0) - region.x,
+        "right": region.x + region.width - min(x + height / 2, 640),
+        "top": max(y - 0.625 * height, 0) - region.y,
+        "bottom": region.y + region.height - min(y + 0.625 * height, 480),
+    }
+    # No less, and less than one step of the grid more.
+    assert all(0 <= room < 16 for room in spare.values()), spare
+    assert all(side % 16 == 0 for side in (region.x, region.y, region.width, region.height))
+    assert region.window_height == pytest.approx(height)
+
+
+@pytest.mark.parametrize(
+    ("bearing", "distance"), [(1.21, 3.0), (-1.21, 3.0), (0.0, 0.29), (0.0, 0.9), (0.63, 3.0), (-0.63, 3.0)]
+)
+def test_where_the_person_is_out_of_the_image_or_fills_it_all_of_it_is_searched(
+    bearing: float, distance: float
+) -> None:
+    assert RegionSize().around(bearing, distance, 536.0, -120.0, look()) is None
+
+
+def test_a_small_person_near_by_has_a_region_for_it_is_not_most_of_the_image() -> None:
+    region = there(RegionSize().around(0.0, 0.8, 160.0, 0.0, look()))
+    assert region.width * region.height < 0.7 * 640 * 480
+
+
+@pytest.mark.parametrize(("column", "within"), [(-0.5, False), (0.5, True), (639.5, True), (640.5, False)])
+def test_a_person_whose_middle_is_beside_the_image_has_no_region(column: float, within: bool) -> None:
+    bearing = math.atan((320 - column) / FOCAL)
+    assert (RegionSize().around(bearing, 3.0, 536.0, -120.0, look()) is not None) == within

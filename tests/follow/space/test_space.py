@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tests.follow.views import there
 
 from limo_hog.follow.robot import LIMO
-from limo_hog.follow.sense.clearance import NO_POINTS
+from limo_hog.follow.sense.clearance import NO_POINTS, Points
 from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.space.places import Places, Wandering
@@ -43,14 +44,13 @@ def entered(
     *scans: Scan,
     ground: Ground | None = None,
     pose: Odometry = HERE,
-    people: NDArray[np.float64] = NO_POINTS,
-    depths: NDArray[np.float64] = NO_POINTS,
+    people: Points = NO_POINTS,
+    depths: Points = NO_POINTS,
 ) -> Ground:
     """The map after scans taken at a pose."""
     for scan in scans:
         ground = GRID.update(ground, scan, pose, people, depths, LIMO)
-    assert ground is not None
-    return ground
+    return there(ground)
 
 
 def wall_scans(pose: Odometry = HERE, began: float = 0.0) -> list[Scan]:
@@ -142,7 +142,7 @@ def test_no_way_leads_through_a_door_narrower_than_the_robot_needs() -> None:
     assert ROUTER.way_towards(GRID, ground, HERE, at((2.5, 0.0))[0])[:, 0].max() < 1.0
 
 
-def test_places_along_a_way_are_so_far_from_where_it_passes_the_robot_and_never_beyond_its_end() -> None:
+def test_places_along_a_way_are_so_far_from_the_robot_and_never_beyond_its_end() -> None:
     way = np.stack([np.arange(0, 2, 0.1), np.zeros(20)], axis=1)
     ahead = along(way, Odometry(x=0.5, y=0.3), np.array([0.0, 0.25, 9.0]))
     assert ahead == pytest.approx(np.array([(0.5, 0.0), (0.75, 0.0), (1.9, 0.0)]))
@@ -162,15 +162,15 @@ def test_a_person_walks_on_where_they_went_and_not_through_walls() -> None:
         free = WANDERING.walk_on(free, 0.1 * step, GRID, ground)
     moving = np.hypot(*free.velocities.T) > 0.2
     assert free.points[moving, 0].mean() == pytest.approx(-2.4, abs=0.25)
+    # The same is drawn from the same.
+    one, other = (WANDERING.walk_on(lost_at(1.0, 0.0, (0.3, 0.0)), 1.0, GRID, mapped()) for _ in range(2))
+    assert np.array_equal(one.points, other.points)
 
 
-def test_no_person_is_where_beams_pass() -> None:
+def test_no_person_is_where_beams_pass_which_begin_where_the_robots_lidar_is() -> None:
     points = at((1.0, 0.5), (1.75, 0.5), (1.9, 0.5), (2.5, 0.5), (3.0, -2.0), (-1.0, 0.0))
     passed = WANDERING.looked_through(points, wall_scan(), HERE, LIMO)
     assert passed.tolist() == [True, True, False, False, True, False]
-
-
-def test_beams_begin_where_the_robots_lidar_is() -> None:
     # A lidar .6 m further ahead measures the same ranges of a wall that is .6 m further away.
     points = at((1.75, 0.5), (2.35, 0.5))
     for ahead, passes in ((0.0, [True, False]), (0.6, [True, True])):
@@ -180,13 +180,7 @@ def test_beams_begin_where_the_robots_lidar_is() -> None:
 
 def test_what_is_seen_to_be_empty_leaves_the_other_places() -> None:
     both = Places(0.0, at((1.0, 0.5), (3.0, 0.5)), np.zeros((2, 2)))
-    left = WANDERING.look(both, wall_scan(), np.zeros(2, bool), HERE, LIMO)
-    assert left is not None
+    left = there(WANDERING.look(both, wall_scan(), np.zeros(2, bool), HERE, LIMO))
     assert left.points.tolist() == [[3.0, 0.5], [3.0, 0.5]]
     near = Places(0.0, at((1.0, 0.5)), np.zeros((1, 2)))
     assert WANDERING.look(near, wall_scan(), np.zeros(1, bool), HERE, LIMO) is None
-
-
-def test_the_same_is_drawn_from_the_same() -> None:
-    one, other = (WANDERING.walk_on(lost_at(1.0, 0.0, (0.3, 0.0)), 1.0, GRID, mapped()) for _ in range(2))
-    assert np.array_equal(one.points, other.points)

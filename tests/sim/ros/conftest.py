@@ -12,8 +12,6 @@ from tests.sim.ros.scripts import HEAD, Run, run_script
 
 @pytest.fixture
 def script(tmp_path: Path) -> Callable[[str], Path]:
-    """Write a script's text into a file."""
-
     def write(text: str) -> Path:
         path = tmp_path / "node.py"
         path.write_text(HEAD + textwrap.dedent(text), encoding="utf-8")
@@ -24,5 +22,4 @@ def script(tmp_path: Path) -> Callable[[str], Path]:
 
 @pytest.fixture
 def run(script: Callable[[str], Path]) -> Run:
-    """Run a script's text, with the arguments of `run_script`."""
     return lambda text, *arguments, **options: run_script(script(text), *arguments, **options)

@@ -73,7 +73,6 @@ def run_script(
     patience: float = 20.0,
     **watching: Any,
 ) -> Ran:
-    """Run a script against the arena as `limo-hog run` does."""
     logged: list[tuple[float, str, str]] = []
     printed = {"stdout": "", "stderr": ""}
 
@@ -81,9 +80,10 @@ def run_script(
         printed[name] += text
         getattr(sys, name).write(text)
 
-    stage = Stage(
-        script, scenario, seconds, seed, log=lambda at, level, _, text: logged.append((at, level, text)), **watching
-    )
+    def log(at: float, level: str, _: object, text: str) -> None:
+        logged.append((at, level, text))
+
+    stage = Stage(script, scenario, seconds, seed, log=log, **watching)
     return Ran(**vars(run_node(stage, arguments, limits=Limits(patience), said=hear)), logged=logged, printed=printed)
 
 

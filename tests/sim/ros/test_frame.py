@@ -102,7 +102,5 @@ def test_an_image_is_copied_once_on_its_way_to_the_node(tmp_path: Path, monkeypa
     ended = run_node(stage, said=lambda name, text: said.append(text) if name == "stdout" else None)
     assert ended.failure == ""
     extra = [float(line) for line in "".join(said).split()]
-    assert len(extra) >= 15
-    assert max(extra) < 0.1
-    assert len(sent) >= 15
-    assert all(sent)
+    assert len(extra) >= 15 and max(extra) < 0.1
+    assert len(sent) >= 15 and all(sent)

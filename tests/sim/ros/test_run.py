@@ -12,7 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from tests.sim.logs import kept_in
+from tests.sim.logs import kept_in, there
 from tests.sim.ros.scripts import DRIVE, FOLLOW, NOBODY, STANDING, Run, node, run_script
 
 from limo_hog.cli.main import main
@@ -37,20 +37,15 @@ def test_the_workshops_node_turns_to_the_person_and_is_scored_and_shown(run: Run
     outcome = run(node(FOLLOW), STANDING, 3.0, watch=steps.append)
     card = score_of(outcome)
     assert outcome.failure == ""
-    assert card.first_detection_s == 0.0
-    assert card.detected == 1.0
-    assert card.frames == 30
-    person = steps[-1].truth.people[0]
-    assert person is not None
-    assert abs(person.bearing) < 0.05
+    assert (card.first_detection_s, card.detected, card.frames) == (0.0, 1.0, 30)
+    assert abs(there(steps[-1].truth.people[0]).bearing) < 0.05
     shown = [(step.windows["camera"], step.log.frame.image) for step in steps if step.log.frame is not None]
     assert len(shown) == 30
     for window, image in shown:
         np.testing.assert_array_equal(window, image)
     with View(STANDING) as view:
         name, _, jpeg = view._pictures(steps[-1])[-1].partition(b"\n")
-    drawn = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
-    assert drawn is not None
+    drawn = there(cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR))
     assert (name, drawn.shape) == (b"wcamera", (480, 640, 3))
 
 
@@ -89,23 +84,20 @@ def test_a_node_with_its_own_detector_is_shown_by_what_it_does_not_by_a_search(r
 
 
 @pytest.mark.parametrize(
-    ("make", "target"),
+    ("declared", "then", "target"),
     [
-        ("", None),
-        ("self.declare_parameter('target_distance', 1.8)", 1.8),
-        ("self.declare_parameter('target_distance', 'near')", None),
-        ("self.declare_parameter('target_distance', float('nan'))", None),
-        (
-            "self.declare_parameter('target_distance', 1.8)\n"
-            "self.set_parameters([rclpy.Parameter('target_distance', value=2.2)])",
-            2.2,
-        ),
+        ("", "", None),
+        ("1.8", "", 1.8),
+        ("'near'", "", None),
+        ("float('nan')", "", None),
+        ("1.8", "self.set_parameters([rclpy.Parameter('target_distance', value=2.2)])", 2.2),
     ],
 )
 def test_a_nodes_parameter_target_distance_is_what_the_card_measures_against(
-    run: Run, make: str, target: float | None
+    run: Run, declared: str, then: str, target: float | None
 ) -> None:
-    card = score_of(run(node(DRIVE, make), STANDING, 0.5))
+    make = f"self.declare_parameter('target_distance', {declared})\n" if declared else ""
+    card = score_of(run(node(DRIVE, make + then), STANDING, 0.5))
     assert card.target_m == target
     assert (card.distance_rms_error_m is None) == (target is None)
 
@@ -147,9 +139,9 @@ def test_the_watchdog_stops_a_robot_whose_node_falls_silent(run: Run) -> None:
     body = f"self.n = getattr(self, 'n', 0) + 1\nif self.n <= 5:\n    {DRIVE}"
     steps: list[Step] = []
     outcome = run(node(body), watch=kept_in(steps))
-    speeds = {step.log.time: step.truth.robot[0] for step in steps}
+    places = {step.log.time: step.truth.robot[0] for step in steps}
     assert outcome.stage.arena.watchdog_stops == 1
-    assert speeds[1.9] - speeds[1.5] == pytest.approx(0.0, abs=1e-6)
+    assert places[1.9] == pytest.approx(places[1.5], abs=1e-6)
 
 
 def test_sleep_in_a_callback_lets_the_arenas_time_pass_not_the_walls(run: Run) -> None:
@@ -185,15 +177,13 @@ def test_what_is_not_offered_is_named_and_mistakes_stay_the_scripts_own(run: Run
 def test_ros_arguments_set_parameters_and_names(run: Run, tmp_path: Path) -> None:
     parameters = tmp_path / "p.yaml"
     parameters.write_text("follower:\n  ros__parameters:\n    speed: 0.1\n    nested: {a: 2}\n")
-    make = (
-        "s = self.declare_parameter('speed', 0.3).value; n = self.declare_parameter('nested.a', 1).value\n"
-        "g = self.declare_parameter('gain', 1.0).value\n"
-        "self.get_logger().info(f'{s} {n} {g} {self.pub.topic_name} {self.get_name()}')"
-    )
+    make = """
+    given = [self.declare_parameter(*one).value for one in (('speed', 0.3), ('nested.a', 1), ('gain', 1.0))]
+    self.get_logger().info(f'{given} {self.pub.topic_name} {self.get_name()}')
+    """
     arguments = ["--ros-args", "--params-file", str(parameters), "-p", "gain:=2.5", "-r", "/cmd_vel:=/other"]
-    assert run(node(DRIVE, make), arguments=arguments, seconds=0.2).logged == [
-        (0.0, "INFO", "0.1 2 2.5 /other follower")
-    ]
+    logged = run(node(DRIVE, make), arguments=arguments, seconds=0.2).logged
+    assert logged == [(0.0, "INFO", "[0.1, 2, 2.5] /other follower")]
 
 
 @pytest.mark.parametrize(
@@ -205,10 +195,13 @@ def test_wrong_ros_arguments_say_what_is_wanted(run: Run, argument: str, said: s
     assert said in run(node(DRIVE, make), arguments=["--ros-args", "-p", argument]).failure
 
 
-def test_timers_keep_their_period_in_the_arenas_time(run: Run) -> None:
+def test_timers_keep_their_period_in_the_arenas_time_and_polling_lets_it_pass(run: Run) -> None:
     make = "self.create_timer(0.25, lambda: self.get_logger().info('tick'))"
     at = [at for at, _, _ in run(node("pass", make)).logged]
     assert at == pytest.approx([0.26, 0.5, 0.76, 1.0, 1.26, 1.5, 1.76], abs=1e-9)
+    text = "rclpy.init()\nn = Node('n')\npub = n.create_publisher(Twist, 'cmd_vel', 1)\nwhile rclpy.ok():\n"
+    text += "    rclpy.spin_once(n, timeout_sec=0)\n    pub.publish(Twist())"
+    assert len(run(text).stage.commands) == 101
 
 
 def test_colour_and_depth_are_paired_by_their_stamps(run: Run) -> None:
@@ -224,14 +217,8 @@ def test_colour_and_depth_are_paired_by_their_stamps(run: Run) -> None:
 
 
 def test_every_topic_of_the_workshop_arrives_at_its_rate(run: Run) -> None:
-    rates = dict.fromkeys(names.TYPES, 10) | {
-        names.SCAN: 8,
-        names.ODOMETRY: 50,
-        names.IMU: 100,
-        names.CLOCK: 50,
-        names.TF: 50,
-        names.TF_STATIC: 0,
-    }
+    rates = dict.fromkeys(names.TYPES, 10) | dict.fromkeys((names.ODOMETRY, names.CLOCK, names.TF), 50)
+    rates |= {names.SCAN: 8, names.IMU: 100, names.TF_STATIC: 0}
     del rates[names.COMMAND], rates[names.ANNOTATED]
     text = "import importlib\nrclpy.init()\nn = Node('n')\n"
     for topic in rates:
@@ -240,18 +227,6 @@ def test_every_topic_of_the_workshop_arrives_at_its_rate(run: Run) -> None:
         text += f"n.create_subscription(T, '{topic}', lambda m: n.get_logger().info('{topic}'), 100)\n"
     counts = Counter(topic for _, _, topic in run(text + "rclpy.spin(n)").logged)
     assert {topic: round(n / 2) for topic, n in counts.items()} == rates
-
-
-def test_polling_and_spinning_with_a_timeout_let_time_pass(run: Run) -> None:
-    text = """
-    rclpy.init()
-    n = Node('n')
-    pub = n.create_publisher(Twist, 'cmd_vel', 1)
-    while rclpy.ok():
-        rclpy.spin_once(n, timeout_sec=0)
-        pub.publish(Twist())
-    """
-    assert len(run(text).stage.commands) == 101
 
 
 def test_a_callback_may_draw_on_its_picture_without_touching_anybody_elses(run: Run) -> None:
@@ -271,25 +246,19 @@ def test_a_script_that_is_not_there_is_named(tmp_path: Path) -> None:
         run_script(tmp_path / "none.py", NOBODY, 1.0)
 
 
-def test_the_command_line_ends_with_1_the_card_and_the_students_traceback(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+def test_the_command_line_prints_json_alone_and_of_a_fault_the_students_traceback(
+    script: Callable[[str], Path], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    script, card = tmp_path / "bad.py", tmp_path / "card.json"
-    script.write_text("import rclpy\nrclpy.init()\nraise RuntimeError('no camera')\n")
-    assert main(["run", str(script), "--seconds", "1", "--json", str(card), "--scenario", "followable"]) == 1
+    assert main(["run", str(script("print('hello')\n" + node(DRIVE))), "--seconds", "1", "--json", "-"]) == 0
+    assert json.loads(capfd.readouterr().out)["seconds"] == 1.0
+    bad, card = tmp_path / "bad.py", tmp_path / "card.json"
+    bad.write_text("import rclpy\nrclpy.init()\nraise RuntimeError('no camera')\n")
+    assert main(["run", str(bad), "--seconds", "1", "--json", str(card), "--scenario", "followable"]) == 1
     assert json.loads(card.read_text())["controller"] == "bad.py"
     out, err = capfd.readouterr()
     assert "followable" in out
     assert 'bad.py", line 3' in err
     assert err.rstrip().splitlines()[-1].startswith("limo-hog: bad.py failed with RuntimeError at 0.00 s: no camera")
-
-
-def test_the_command_line_prints_nothing_but_json(
-    script: Callable[[str], Path], capfd: pytest.CaptureFixture[str]
-) -> None:
-    path = script("print('hello')\n" + node(DRIVE))
-    assert main(["run", str(path), "--seconds", "1", "--json", "-"]) == 0
-    assert json.loads(capfd.readouterr().out)["seconds"] == 1.0
 
 
 def test_images_go_through_cv_bridge_and_back(run: Run) -> None:

@@ -28,7 +28,6 @@ ALONE = {"ROS_DOMAIN_ID": str(DOMAIN), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHO
 
 
 def by_program(text: str) -> dict[str, list[str]]:
-    """Part what was printed by the headings."""
     parts = re.split(r"^# (\w+)\n", text, flags=re.MULTILINE)[1:]
     return {name: lines.splitlines() for name, lines in zip(parts[::2], parts[1::2], strict=True)}
 
@@ -43,7 +42,7 @@ def ours() -> dict[str, list[str]]:
     return by_program(run_script(SMALL, seconds=60.0).printed["stdout"])
 
 
-@pytest.mark.parametrize("name", re.findall(r"^@program\ndef (\w+)", SMALL.read_text(), re.MULTILINE))
+@pytest.mark.parametrize("name", re.findall(r"^def (\w+)\((?:node|_)\):", SMALL.read_text(), re.MULTILINE))
 def test_a_small_program_prints_the_same(name: str, theirs: dict[str, list[str]], ours: dict[str, list[str]]) -> None:
     assert theirs["end"] == ours["end"] == []
     assert ours[name] == theirs[name]

@@ -1,10 +1,14 @@
-"""What a node of the tutorials is told: of topics that nobody publishes, qualities that do not match, and its files."""
+"""Nodes in the style of the public tutorials run unmodified, and are told of topics and qualities that do not match."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from tests.sim.ros.scripts import DRIVE, Run, node, run_script
+import pytest
+from tests.sim.logs import there
+from tests.sim.ros.scripts import DRIVE, NOBODY, STANDING, Ran, Run, node, run_script
+
+from limo_sim.world.scenario import Scenario
 
 ZERO = "self.pub.publish(Twist())"
 
@@ -29,7 +33,7 @@ def test_a_subscription_that_hears_nothing_warns_after_two_seconds_and_names_a_t
     ]
 
 
-def test_a_publisher_and_a_subscription_of_other_qualities_exchange_nothing_and_ros_says_so(run: Run) -> None:
+def test_a_publisher_and_a_subscription_of_other_qualities_are_told_that_they_differ(run: Run) -> None:
     make = """
     from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
     best = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -39,10 +43,9 @@ def test_a_publisher_and_a_subscription_of_other_qualities_exchange_nothing_and_
     """
     ended = run(node(DRIVE, make), seconds=0.5)
     reader, writer = (said for _, _, said in ended.logged)
-    assert reader.endswith("incompatible QoS. No messages will be sent to it. Last incompatible policy: RELIABILITY")
-    assert writer.endswith(
-        "incompatible QoS. No messages will be received from it. Last incompatible policy: DURABILITY"
-    )
+    for said, way, policy in ((reader, "sent to", "RELIABILITY"), (writer, "received from", "DURABILITY")):
+        last = f"incompatible QoS. No messages will be {way} it. Last incompatible policy: {policy}"
+        assert said.endswith(last)
     assert reader in ended.failure
     assert not ended.stage.commands
 
@@ -50,13 +53,60 @@ def test_a_publisher_and_a_subscription_of_other_qualities_exchange_nothing_and_
 def test_a_node_of_a_package_finds_the_packages_modules_and_files(tmp_path: Path) -> None:
     package = tmp_path / "src" / "amy"
     (package / "amy").mkdir(parents=True)
-    (package / "package.xml").write_text("<package/>")
-    (package / "amy" / "__init__.py").write_text("")
-    (package / "amy" / "helper.py").write_text("WORD = 'there'\n")
-    (package / "amy" / "go.py").write_text(
-        "import rclpy\nfrom ament_index_python.packages import get_package_share_directory as share\n"
-        "from amy.helper import WORD\nrclpy.init()\nlogger = rclpy.create_node('go').get_logger()\n"
-        "for word in (WORD, share('amy'), share('unknown')):\n    logger.info(word)\n"
-    )
+    go = "import rclpy\nfrom ament_index_python.packages import get_package_share_directory as share\n"
+    go += "from amy.helper import WORD\nrclpy.init()\nlogger = rclpy.create_node('go').get_logger()\n"
+    go += "for word in (WORD, share('amy'), share('unknown')):\n    logger.info(word)\n"
+    files = {"package.xml": "<package/>", "amy/__init__.py": "", "amy/helper.py": "WORD = 'there'\n", "amy/go.py": go}
+    for name, text in files.items():
+        (package / name).write_text(text)
     ended = run_script(package / "amy" / "go.py", seconds=0.2)
     assert [said for _, _, said in ended.logged] == ["there", str(package), str(package / "amy")]
+
+
+NODES = Path(__file__).parent / "nodes"
+
+
+def ran(name: str, scenario: Scenario = NOBODY, seconds: float = 4.0) -> Ran:
+    return run_script(NODES / f"{name}.py", scenario, seconds)
+
+
+def commands(run: Ran) -> list[tuple[float, float, float]]:
+    return [(round(c.time, 2), c.twist.linear, c.twist.angular) for c in run.stage.commands]
+
+
+def bearing(run: Ran) -> float:
+    """Where the first person is in the end, seen from the robot [rad]."""
+    return there(run.stage.arena.truth().people[0]).bearing
+
+
+def test_a_callback_may_wait_for_a_service_in_a_multi_threaded_executor() -> None:
+    run = ran("groups", seconds=4.5)
+    assert run.said == ["motor on", "motor off", "motor on", "motor off"]
+    speeds = {at: linear for at, linear, _ in commands(run)}
+    assert (speeds[0.9], speeds[1.5], speeds[2.5], speeds[3.5]) == (0.0, 0.3, 0.0, 0.3)
+
+
+def test_message_filters_and_a_camera_model_find_the_nearest_thing() -> None:
+    run = ran("filters", STANDING, 3.0)
+    assert run.said[0].startswith("bgr8 nearest 2.")
+    assert abs(bearing(run)) < 0.05
+
+
+def test_a_listener_of_frames_drives_to_a_frame() -> None:
+    run = ran("tf_listener", seconds=15.0)
+    assert run.said[-1].startswith("arrived; 1 m before the lidar is 1.")
+    x, y, _ = run.stage.arena.truth().robot[:3]
+    assert (x, y) == pytest.approx((1.0, 0.5), abs=0.12)
+
+
+def test_a_scan_follower_with_a_thread_that_spins_and_a_rate_turns_to_what_is_near() -> None:
+    run = ran("scan_follower", STANDING, 4.0)
+    assert [at for at, _, _ in commands(run)[1:20]] == pytest.approx([0.1 * k for k in range(1, 20)], abs=0.03)
+    assert abs(bearing(run)) < 0.2
+
+
+@pytest.mark.parametrize("name", ["groups", "scan_follower"])
+def test_threads_take_turns_so_that_two_runs_are_the_same(name: str) -> None:
+    first, second = (ran(name, STANDING, 3.0) for _ in range(2))
+    assert commands(first) == commands(second)
+    assert first.said == second.said

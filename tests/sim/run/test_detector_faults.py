@@ -7,7 +7,6 @@ from collections.abc import Callable
 from itertools import groupby
 from pathlib import Path
 from statistics import NormalDist
-from typing import Any
 
 import numpy as np
 import pytest
@@ -35,19 +34,17 @@ SILHOUETTES = ((100, 150, 60, 180), (420, 150, 60, 180))
 WINDOWS = np.array([[85, 120, 90, 240], [405, 120, 90, 240]], np.int32)
 
 
-def truth(frame: int, rate: float = 10.0) -> Truth:
+def truth(frame: int) -> Truth:
     people = tuple(PersonTruth(2.0, 0.0, 0.0, 2.0, 0.0, 1.8, 1.0, box) for box in SILHOUETTES)
-    return Truth(frame / rate, (0.0, 0.0, 0.0), people, Contacts())
+    return Truth(frame / 10, (0.0, 0.0, 0.0), people, Contacts())
 
 
 PERSON = Person(route=((2.0, 0.0, 3600.0),))
 
 
 class Faulty:
-    """A detector with the faults of a scenario with two people."""
-
-    def __init__(self, detector: Detector, faults: DetectorFaults, seed: int = 0, rate: float = 10.0) -> None:
-        scenario = Scenario(people=(PERSON, PERSON), detector=faults, camera=Camera(rate_hz=rate))
+    def __init__(self, detector: Detector, faults: DetectorFaults, seed: int = 0) -> None:
+        scenario = Scenario(people=(PERSON, PERSON), detector=faults, camera=Camera(rate_hz=10.0))
         self._detector, self._truth = detector, truth(0)
         self._search = FaultySearch(scenario, seed, lambda: self._truth)
 
@@ -56,9 +53,9 @@ class Faulty:
         return self._search(self._detector, IMAGE, region)
 
 
-def seen(faults: DetectorFaults, frames: int, seed: int = 0, rate: float = 10.0) -> list[Detections]:
-    faulty = Faulty(Finds(*WINDOWS), faults, seed, rate)
-    return [faulty.at(truth(frame, rate)) for frame in range(frames)]
+def seen(faults: DetectorFaults, frames: int, seed: int = 0) -> list[Detections]:
+    faulty = Faulty(Finds(*WINDOWS), faults, seed)
+    return [faulty.at(truth(frame)) for frame in range(frames)]
 
 
 def found_of(frames: list[Detections], person: int) -> NDArray[np.bool_]:
@@ -93,8 +90,7 @@ def test_false_boxes_come_at_their_rate_within_the_image_and_best_first() -> Non
     assert abs(np.var(counts) - 0.4) < 0.05
     boxes = np.concatenate([found.windows for found in frames])
     assert (boxes[:, :2] >= 0).all()
-    assert (boxes[:, 0] + boxes[:, 2] <= 640).all()
-    assert (boxes[:, 1] + boxes[:, 3] <= 480).all()
+    assert (boxes[:, :2] + boxes[:, 2:] <= (640, 480)).all()
     assert boxes[:, 3].min() >= 128
     assert all((np.diff(found.scores) <= 0).all() for found in frames)
 
@@ -151,11 +147,9 @@ def test_in_a_part_of_the_image_the_false_boxes_are_those_that_lie_within_it(hal
     assert count > 20
     # One window in eighty is drawn as high as the image or higher.
     assert from_the_top > 0
-
-
-def test_the_half_size_detector_keeps_its_own_boxes() -> None:
-    faulty = Faulty(HalfSize(Finds(*WINDOWS)), DetectorFaults(false_rate=0.001))
-    np.testing.assert_array_equal(faulty.at(truth(0)).windows[:2], WINDOWS * 2)
+    # A search at half size keeps its own boxes.
+    halves = Faulty(HalfSize(Finds(*WINDOWS)), DetectorFaults(false_rate=0.001))
+    np.testing.assert_array_equal(halves.at(truth(0)).windows[:2], WINDOWS * 2)
 
 
 def at_height(height: int, model: str, frames: int, seed: int = 0) -> NDArray[np.bool_]:
@@ -177,7 +171,7 @@ def test_a_model_keeps_the_share_of_its_fit_at_every_height(model: str, height: 
     assert abs(found.mean() - fit_of(model).kept(height)) < 0.03
 
 
-def test_a_model_misses_in_bursts_as_long_as_its_memory() -> None:
+def test_a_model_misses_in_bursts_of_its_memory_and_its_fit_grows_with_height() -> None:
     found = at_height(130, "opencv", 10_000)
     share, fit = found.mean(), fit_of("opencv")
     # P(missed twice) of two standard normals with this correlation: the bivariate normal integral, by quadrature.
@@ -187,6 +181,11 @@ def test_a_model_misses_in_bursts_as_long_as_its_memory() -> None:
     both = np.trapezoid(np.exp(-(z**2) / 2) / math.sqrt(2 * math.pi) * above, z)
     assert abs((~found[1:] & ~found[:-1]).mean() - both) < 0.02
     assert both > 1.3 * (1 - share) ** 2
+    heights = np.geomspace(64, 250, 30)
+    for fit in map(fit_of, ("opencv", "limo")):
+        assert all(np.diff([fit.photographs.at(height) for height in heights]) > 0)
+        assert all(0.0 < fit.kept(height) <= 1.0 for height in (0.0, *heights, 480.0))
+        assert fit.memory_s > 0
 
 
 def test_a_models_misses_and_false_boxes_are_those_of_the_seed() -> None:
@@ -196,16 +195,6 @@ def test_a_models_misses_and_false_boxes_are_those_of_the_seed() -> None:
     extra = [len(found) - found_of([found], 0)[0] - found_of([found], 1)[0] for found in frames]
     rate = fit_of("opencv").false_rate
     assert abs(np.mean(extra) - rate) < 4 * math.sqrt(rate / 10_000)
-
-
-def test_the_fits_are_probabilities_that_grow_with_the_height() -> None:
-    for model in ("opencv", "limo"):
-        fit = fit_of(model)
-        heights = np.geomspace(64, 250, 30)
-        shares = [fit.photographs.at(height) for height in heights]
-        assert all(np.diff(shares) > 0)
-        assert all(0.0 < fit.kept(height) <= 1.0 for height in (0.0, *heights, 480.0))
-        assert fit.memory_s > 0
 
 
 @pytest.fixture
@@ -239,32 +228,22 @@ def node(tmp_path: Path) -> Path:
     return tmp_path / "node.py"
 
 
-@pytest.mark.parametrize(
-    "start",
-    [
-        lambda _: Arena(DRAWN, 3),
-        lambda _: run_episode(DRAWN, ApproachController(), detector_named("hog"), 0.2, 3),
-        lambda node: run_node(Stage(node, DRAWN, 0.5, 3)).episode,
-        lambda _: run_live(DRAWN, 3, 0.04, None),
-    ],
-    ids=["arena", "closed loop", "node", "arena on the network"],
-)
-def test_whoever_runs_meets_the_people_of_the_seed(start: Callable[[Path], Any], node: Path) -> None:
-    assert start(node).scenario == of_run(DRAWN, 3)
+def test_whoever_runs_meets_the_people_of_the_seed(node: Path) -> None:
+    closed_loop = run_episode(DRAWN, ApproachController(), detector_named("hog"), 0.2, 3)
+    by_node, on_the_network = run_node(Stage(node, DRAWN, 0.5, 3)).episode, run_live(DRAWN, 3, 0.04, None)
+    for scenario in (Arena(DRAWN, 3).scenario, closed_loop.scenario, by_node.scenario, on_the_network.scenario):
+        assert scenario == of_run(DRAWN, 3)
 
 
-def test_a_sweep_runs_with_the_people_of_the_seed(tmp_path: Path) -> None:
+def test_a_sweep_and_every_episode_of_the_environment_have_their_seeds_people(tmp_path: Path) -> None:
+    env = LimoFollowV1(DRAWN)
+    places = [env.reset(seed=seed)[0].tolist() for seed in (0, 1, 0)]
+    assert places[0] == places[2] != places[1]
     assert Arena(DRAWN).scenario == Arena(DRAWN, 0).scenario != Arena(DRAWN, 3).scenario
     file = tmp_path / "drawn.toml"
     file.write_text("[vary]\nplace = 0.4\n[[people]]\nroute = [[2.5, 0.0, 0.0], [3.0, 1.5, 0.0]]\n", encoding="utf-8")
     cards = [play(Run(str(file), "approach", "hog", seed, 0.2)) for seed in (3, 4, 3)]
     assert cards[0].scenario_hash == cards[2].scenario_hash != cards[1].scenario_hash
-
-
-def test_every_episode_of_the_environment_draws_people_of_its_own() -> None:
-    env = LimoFollowV1(DRAWN)
-    places = [env.reset(seed=seed)[0].tolist() for seed in (0, 1, 0)]
-    assert places[0] == places[2] != places[1]
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from tests.sim.logs import drive
+from tests.sim.logs import drive, there
 
 from limo_hog.cli.main import main
 from limo_hog.follow.robot import LIMO
@@ -34,14 +34,13 @@ def test_a_pillars_box_is_the_projection_of_its_cylinder() -> None:
     [(visible, box)] = arena_after_a_frame(PILLAR).furniture_in_frame()
     assert visible == pytest.approx(1.0, abs=0.02)
     assert box is not None
-    ahead = PILLAR.x - LIMO.camera_x
+    ahead, focal = PILLAR.x - LIMO.camera_x, LIMO.focal_px(640)
     distance = math.hypot(ahead, PILLAR.y)
     half = math.asin(0.15 / distance)
-    left, right = (319.5 - LIMO.focal_px(640) * math.tan(math.atan2(PILLAR.y, ahead) + side) for side in (half, -half))
-    top = 239.5 - LIMO.focal_px(640) * (1.1 - LIMO.camera_z) / (distance - 0.15)  # of the edge nearest to the camera
-    assert box[0] == pytest.approx(left, abs=2)
-    assert box[0] + box[2] == pytest.approx(right, abs=2)
-    assert box[1] == pytest.approx(top, abs=3)
+    left, right = (319.5 - focal * math.tan(math.atan2(PILLAR.y, ahead) + side) for side in (half, -half))
+    assert (box[0], box[0] + box[2]) == pytest.approx((left, right), abs=2)
+    # Of the edge nearest to the camera.
+    assert box[1] == pytest.approx(239.5 - focal * (1.1 - LIMO.camera_z) / (distance - 0.15), abs=3)
 
 
 def test_what_is_hidden_cut_off_or_behind_the_robot_counts_as_unseen() -> None:
@@ -79,16 +78,14 @@ def test_what_is_written_is_coco_with_depth_and_identities(tmp_path: Path, capsy
     assert {note["track_id"] for note in data["annotations"]} <= {0, 1}
     assert all(note["iscrowd"] == (note["visible"] < 0.65) for note in data["annotations"])
     pictures = read_labels(out / "coco.json")
-    assert len(pictures) == 8
-    assert sum(len(picture.boxes) for picture in pictures) == len(data["annotations"]) > 0
+    assert len(pictures) == 8 and sum(len(picture.boxes) for picture in pictures) == len(data["annotations"]) > 0
     note = next(note for note in data["annotations"] if note["visible"] > 0.95)
     image = data["images"][note["image_id"] - 1]
-    depth = cv2.imread(str(out / image["depth_file_name"]), cv2.IMREAD_UNCHANGED)
-    assert depth is not None
+    depth = there(cv2.imread(str(out / image["depth_file_name"]), cv2.IMREAD_UNCHANGED))
     assert depth.dtype == np.uint16
     x, y, w, h = note["bbox"]
-    there, beside = (depth[y + h // 3 : y + h // 2, x + w // 2 + shift] for shift in (0, w))
-    assert np.median(there[there > 0]) < np.median(beside) or np.median(beside) == 0
+    on, beside = (depth[y + h // 3 : y + h // 2, x + w // 2 + shift] for shift in (0, w))
+    assert np.median(on[on > 0]) < np.median(beside) or np.median(beside) == 0
 
 
 @pytest.mark.parametrize("more", [[], ["--resume"]])

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.follow.loop import Headstrong
 from tests.sim.logs import drive
 
 from limo_hog import PeopleDetector
-from limo_hog.follow import LIMO, Decision, Follower, Mode, RobotError, Twist
-from limo_hog.follow.robot import RobotGeometry
+from limo_hog.follow import LIMO, Follower, RobotError, Twist
 from limo_hog.follow.sense.clearance import completed, scan_points
 from limo_hog.follow.sense.observation import Sensors
 from limo_sim.run.arena import Arena
@@ -72,11 +72,9 @@ def test_where_the_lidar_does_not_look_the_depth_image_completes_the_scan(tmp_pa
     ahead = points[np.abs(np.arctan2(points[:, 1], points[:, 0])) < 0.4]
     assert len(ahead) > 50
     assert ahead[:, 0] == pytest.approx(np.full(len(ahead), 3.0), abs=0.01)  # the wall, as far as it is
-
-
-def test_the_scan_of_a_lidar_that_looks_where_the_camera_does_stays_as_it_is(tmp_path: Path) -> None:
-    arena = Arena(quiet(own(tmp_path, "")))
-    assert completed(arena.scan(), arena.frame(), arena.odometry(), LIMO) is arena.scan()
+    # A Limo's lidar looks where the camera does.
+    limo = Arena(quiet(own(tmp_path, "")))
+    assert completed(limo.scan(), limo.frame(), limo.odometry(), LIMO) is limo.scan()
 
 
 def test_wheels_do_what_the_file_says(tmp_path: Path) -> None:
@@ -85,23 +83,10 @@ def test_wheels_do_what_the_file_says(tmp_path: Path) -> None:
     assert drive(arena, 3.0, Twist(0.0, 5.0)).odometry().angular == pytest.approx(2 * 0.6 / 0.3, abs=1e-6)
 
 
-@dataclasses.dataclass(frozen=True)
-class Ahead:
-    """Drives ahead, whatever there is."""
-
-    robot: RobotGeometry = LIMO
-
-    def start(self) -> None:
-        return None
-
-    def step(self, _: Any, state: None) -> Decision[None]:
-        return Decision(Twist(0.6, 0.0), state, Mode.FOLLOW, "ahead")
-
-
 @pytest.mark.parametrize("text", ["", OWN], ids=["limo", "own"])
 def test_the_outline_keeps_its_distance_from_a_wall(text: str, tmp_path: Path) -> None:
     arena = Arena(quiet(own(tmp_path, text)))
-    follower = Follower(Ahead(), PeopleDetector(), arena.robot)
+    follower = Follower(Headstrong(Twist(0.6, 0.0)), PeopleDetector(), arena.robot)
     while arena.time < 14.0:
         log = follower.tick(arena.time, arena.frame(), Sensors(arena.scan(), arena.odometry()))
         if log is not None:
@@ -114,15 +99,16 @@ def test_the_outline_keeps_its_distance_from_a_wall(text: str, tmp_path: Path) -
 
 
 def test_a_scenario_may_bring_its_robot_and_a_wrong_one_is_named(tmp_path: Path) -> None:
-    (tmp_path / "own.toml").write_text("[robot.geometry]\ncamera_z = 0.25\n")
-    scenario = Scenario.load(tmp_path / "own.toml")
+    path = tmp_path / "own.toml"
+    path.write_text("[robot.geometry]\ncamera_z = 0.25\n")
+    scenario = Scenario.load(path)
     assert scenario.robot.geometry == dataclasses.replace(LIMO, camera_z=0.25)
     assert scenario_hash(scenario) != scenario_hash(Scenario()) == scenario_hash(own(tmp_path, ""))
-    (tmp_path / "wrong.toml").write_text("[robot.geometry]\ncamera_z = 5.0\n")
-    with pytest.raises(ScenarioError, match=r"wrong\.toml: robot\.geometry\.camera_z: got 5\.0, want .* 0\.02"):
-        Scenario.load(tmp_path / "wrong.toml")
+    path.write_text("[robot.geometry]\ncamera_z = 5.0\n")
+    with pytest.raises(ScenarioError, match=r"own\.toml: robot\.geometry\.camera_z: got 5\.0, want .* 0\.02"):
+        Scenario.load(path)
     with pytest.raises(RobotError, match=r"robot\.toml: wings: unknown key"):
         own(tmp_path, "wings = 2")
-    (tmp_path / "cone.toml").write_text('[[furniture]]\nkind = "cone"\nx = 1.0\ny = 0.0\n')
+    path.write_text('[[furniture]]\nkind = "cone"\nx = 1.0\ny = 0.0\n')
     with pytest.raises(ScenarioError, match=r"furniture\[0\]: is 0\.80 m from .*, want at least 1\.41 m"):
-        own(tmp_path, "half_length = 1.0\nhalf_width = 1.0", str(tmp_path / "cone.toml"))
+        own(tmp_path, "half_length = 1.0\nhalf_width = 1.0", str(path))

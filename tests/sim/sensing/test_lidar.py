@@ -48,12 +48,9 @@ def test_ranges_equal_the_physics_engines_ray_casts(seed: int) -> None:
     yaw = float(random.uniform(-3, 3))
     expected = by_physics(0.5, -0.3, yaw, shapes)
     np.testing.assert_allclose(lidar.cast(0.5, -0.3, yaw, shapes), expected, atol=2e-3)
-
-
-def test_an_axis_aligned_beam_is_not_a_division_by_zero() -> None:
+    # A beam along an axis is no division by zero.
     ranges = lidar.cast(0.0, 0.0, 2.0, [Rectangle(3, 0, 0.1, 0.1)])
-    assert ranges[0] == pytest.approx(2.9)
-    assert np.isfinite(ranges).all()
+    assert ranges[0] == pytest.approx(2.9) and np.isfinite(ranges).all()
 
 
 @pytest.mark.parametrize("height", [0.6, 1.2, 1.85, 2.0])
@@ -87,15 +84,11 @@ def test_noise_has_the_spread_asked_for_and_ranges_keep_their_limits() -> None:
     np.testing.assert_array_equal(limits, np.array([np.inf, 0.5, 7.9, np.inf], np.float32))
 
 
-def test_a_scan_has_the_robots_beams_and_sees_the_walls() -> None:
+def test_a_scan_has_the_robots_beams_and_sees_inner_walls_and_the_walls_of_any_room() -> None:
     scan = Arena(Scenario.load("empty"), 0).scan()
-    assert scan.ranges.shape == (292,)
-    assert scan.ranges.dtype == np.float32
+    assert scan.ranges.shape == (292,) and scan.ranges.dtype == np.float32
     assert (scan.angle_min, scan.angle_max, scan.range_min, scan.range_max) == (-2.0, 2.0, 0.12, 8.0)
     assert scan.ranges[140:152] == pytest.approx(4.9 - 0.103, abs=0.05)
-
-
-def test_a_scan_sees_inner_walls_and_the_walls_of_another_room() -> None:
     wall = Wall((1.0, 1.0), (3.0, 1.0), 0.2)
     arena = Arena(Scenario(lidar=Lidar(noise_m=0.0), room=Room(3.0), walls=(wall,)), 0)
     ranges, angles = arena.scan().ranges, np.linspace(-2, 2, 292)

@@ -1,15 +1,19 @@
-"""The camera sees what geometry says: compared with rays solved one by one in exact perspective."""
+"""The camera sees what rays solved one by one see; the canvas draws solids where a formula says they are."""
 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from tests.sim.logs import there
 
+from limo_hog._core import Canvas
+from limo_hog.exceptions import ParameterError
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.detectors import detector_named
 from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, CameraPose
@@ -40,10 +44,8 @@ def picture(
 
 def rays(columns: NDArray[np.int64], rows: NDArray[np.int64]) -> NDArray[np.float64]:
     """Directions in the arena's frame of pixels seen by a camera at `HERE`, one metre deep."""
-    return np.stack(
-        [np.ones(len(columns)), -(columns - CENTRE_X) / LIMO.focal_px(640), -(rows - CENTRE_Y) / LIMO.focal_px(640)],
-        axis=1,
-    )
+    left, up = (CENTRE_X - columns) / LIMO.focal_px(640), (CENTRE_Y - rows) / LIMO.focal_px(640)
+    return np.stack([np.ones(len(columns)), left, up], axis=1)
 
 
 def first_hit(figure: BodyMesh, directions: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -52,19 +54,13 @@ def first_hit(figure: BodyMesh, directions: NDArray[np.float64]) -> NDArray[np.f
     balls = (figure.start + share * (figure.end - figure.start)).reshape(-1, 3)
     radii = (figure.start_radius + share[..., 0] * (figure.end_radius - figure.start_radius)).reshape(-1)
     nearest = np.full(len(directions), np.inf)
-    a = (directions**2).sum(axis=1)
-    for centre, radius in zip(balls, radii, strict=True):
-        b = directions @ (centre - EYE)
-        under = b * b - a * (((centre - EYE) ** 2).sum() - radius**2)
-        hit = np.where(under > 0, (b - np.sqrt(np.maximum(under, 0))) / a, np.inf)
-        nearest = np.minimum(nearest, hit)
-    for centre, axes in zip(figure.centre, figure.axes, strict=True):
-        shrink = np.linalg.inv(axes)
+    solids = [(np.eye(3) / radius, centre) for centre, radius in zip(balls, radii, strict=True)]
+    solids += [(np.linalg.inv(axes), centre) for centre, axes in zip(figure.centre, figure.axes, strict=True)]
+    for shrink, centre in solids:
         ahead, offset = directions @ shrink.T, shrink @ (centre - EYE)
-        a_in, b_in = (ahead**2).sum(axis=1), ahead @ offset
-        under = b_in * b_in - a_in * ((offset**2).sum() - 1)
-        hit = np.where(under > 0, (b_in - np.sqrt(np.maximum(under, 0))) / a_in, np.inf)
-        nearest = np.minimum(nearest, hit)
+        a, b = (ahead**2).sum(axis=1), ahead @ offset
+        under = b * b - a * ((offset**2).sum() - 1)
+        nearest = np.minimum(nearest, np.where(under > 0, (b - np.sqrt(np.maximum(under, 0))) / a, np.inf))
     return nearest
 
 
@@ -152,33 +148,28 @@ def test_inner_walls_have_the_depth_that_marching_along_the_rays_finds(camera: C
     np.testing.assert_allclose(depth[rows, columns].clip(max=furthest), expected, rtol=0, atol=0.004)
 
 
-def test_somebody_behind_an_inner_wall_is_hidden_and_in_its_door_is_not() -> None:
-    walls = (Wall((2.0, -3.0), (2.0, -0.5)), Wall((2.0, 0.5), (2.0, 3.0)))
-    flat = dataclasses.replace(EXACT, walls=walls)
-    shares = [picture(Pose(3.0, y, 0.0), scenario=flat)[2][0][0] for y in (0.0, 1.4)]
-    assert shares == [1.0, 0.0]
-    assert picture(Pose(1.5, 0.6, 0.0), scenario=flat)[2][0][0] == 1.0
-
-
 def test_colour_changes_where_depth_does() -> None:
-    """The wall's upper edge lies at the same row in both images, in every column."""
+    # The wall's upper edge lies at the same row in both images, in every column.
     image, depth, _ = picture(camera=CameraPose(1.0, -2.0, 0.7))
     bright = np.abs(np.diff(image[:240, :, 0].astype(int), axis=0)).argmax(axis=0)
     far = np.isinf(depth[:240]).sum(axis=0) - 1
     assert np.abs(bright - far).max() <= 1
 
 
-def test_somebody_behind_a_pillar_is_hidden_and_in_front_of_it_is_not() -> None:
-    pillar = Furniture("pillar", 2.0, 0.0)
-    _, hidden_depth, [(hidden, box)] = picture(Pose(4.0, 0.0, 0.0), furniture=(pillar,))
-    assert hidden < 0.05
-    assert box is not None
-    _, _, [(part, _)] = picture(Pose(4.0, 0.3, 0.0), furniture=(pillar,))
-    assert 0.1 < part < 0.9
-    _, depth, [(front, _)] = picture(Pose(1.6, 0.0, 0.0), furniture=(pillar,))
-    assert front == 1.0
-    assert hidden_depth[200, 320] == pytest.approx(1.85, abs=0.02)
-    assert depth[110, 320] < 1.6
+def test_somebody_behind_a_pillar_or_wall_is_hidden_and_before_or_beside_it_not() -> None:
+    pillar = (Furniture("pillar", 2.0, 0.0),)
+    _, behind, [(hidden, box)] = picture(Pose(4.0, 0.0, 0.0), furniture=pillar)
+    _, _, [(part, _)] = picture(Pose(4.0, 0.3, 0.0), furniture=pillar)
+    _, before, [(front, _)] = picture(Pose(1.6, 0.0, 0.0), furniture=pillar)
+    assert hidden < 0.05 and box is not None
+    assert 0.1 < part < 0.9 < front == 1.0
+    assert behind[200, 320] == pytest.approx(1.85, abs=0.02)
+    assert before[110, 320] < 1.6
+    walls = (Wall((2.0, -3.0), (2.0, -0.5)), Wall((2.0, 0.5), (2.0, 3.0)))
+    flat = dataclasses.replace(EXACT, walls=walls)
+    shares = [picture(Pose(3.0, y, 0.0), scenario=flat)[2][0][0] for y in (0.0, 1.4)]
+    assert shares == [1.0, 0.0]
+    assert picture(Pose(1.5, 0.6, 0.0), scenario=flat)[2][0][0] == 1.0
 
 
 def test_the_nearer_of_two_people_hides_the_other_whoever_comes_first() -> None:
@@ -211,20 +202,14 @@ def test_of_somebody_nearby_the_image_shows_what_single_rays_show(person: Person
     assert np.median(gaps) < gap
 
 
-def test_somebody_behind_the_camera_is_not_seen() -> None:
-    image, depth, [seen] = picture(Pose(-2.0, 0.0, 0.0))
-    empty, empty_depth, _ = picture(None)
-    assert seen == (0.0, None)
+def test_somebody_behind_the_camera_is_not_seen_and_who_touches_it_does_no_harm() -> None:
+    (image, depth, seen), (empty, empty_depth, _) = picture(Pose(-2.0, 0.0, 0.0)), picture(None)
+    assert seen == [(0.0, None)]
     np.testing.assert_array_equal(image, empty)
     np.testing.assert_array_equal(depth, empty_depth)
-
-
-@pytest.mark.parametrize("distance", [0.05, 0.15, 0.25, 0.5])
-def test_a_person_who_touches_the_camera_does_no_harm(distance: float) -> None:
-    for y in (-0.2, 0.0, 0.2):
+    for distance, y in itertools.product((0.05, 0.15, 0.25, 0.5), (-0.2, 0.0, 0.2)):
         _, depth, [(visible, _)] = picture(Pose(distance, y, 1.0, 2.0, 1.0))
-        assert 0.0 <= visible <= 1.0
-        assert not np.isnan(depth).any()
+        assert 0.0 <= visible <= 1.0 and not np.isnan(depth).any()
 
 
 def test_colour_noise_is_grey_and_as_strong_as_asked_for() -> None:
@@ -280,23 +265,17 @@ def test_bricks_lie_at_their_height_on_every_side_of_an_inner_wall() -> None:
     scenario = dataclasses.replace(EXACT, walls=(wall,), walls_texture=bricks)
     for camera in (HERE, CameraPose(4, 0, math.pi)):
         image, depth, _ = picture(scenario=scenario, camera=camera)
-        distance = 1.85
-        assert depth[240, 320] == pytest.approx(distance, rel=0.02)
+        assert depth[240, 320] == pytest.approx(1.85, rel=0.02)
         # From the wall's top down, a joint every 0.0625 m (ten of the picture's pixels).
-        rows = [
-            CENTRE_Y - LIMO.focal_px(640) * (1.0 - 0.0625 * n - 0.006 - LIMO.camera_z) / distance for n in range(3, 14)
-        ]
+        heights = 1.0 - 0.0625 * np.arange(3, 14) - 0.006 - LIMO.camera_z
+        rows = np.round(CENTRE_Y - LIMO.focal_px(640) * heights / 1.85).astype(int)
         profile = image[:, 250:390].mean(axis=(1, 2))
-        joints = np.mean([profile[round(row)] for row in rows])
-        between = np.mean([profile[round(row) + 8] for row in rows])
-        assert joints < 0.8 * between
+        assert profile[rows].mean() < 0.8 * profile[rows + 8].mean()
 
 
-def test_paint_changes_neither_depth_nor_sky_nor_floor() -> None:
-    painted, camera = (
-        dataclasses.replace(EXACT, walls_texture=WallsTexture("bricks", 0.3, 1.0)),
-        CameraPose(1.0, 0.5, 0.6),
-    )
+def test_paint_changes_neither_depth_nor_sky_nor_floor_and_is_that_of_its_seed() -> None:
+    painted = dataclasses.replace(EXACT, walls_texture=WallsTexture("bricks", 0.3, 1.0))
+    camera = CameraPose(1.0, 0.5, 0.6)
     (before, depth, _), (after, same, _) = picture(camera=camera), picture(camera=camera, scenario=painted)
     np.testing.assert_array_equal(depth, same)
     changed = (before != after).any(axis=2)
@@ -304,9 +283,6 @@ def test_paint_changes_neither_depth_nor_sky_nor_floor() -> None:
     on_wall = np.flatnonzero(changed.any(axis=1))
     assert on_wall[0] > CENTRE_Y - LIMO.focal_px(640) * 0.83 / 2.5
     assert on_wall[-1] < CENTRE_Y + LIMO.focal_px(640) * 0.18 / 2.5
-
-
-def test_the_same_seed_paints_the_same_and_another_seed_something_else() -> None:
     boards = [dataclasses.replace(EXACT, walls_texture=WallsTexture("boards", posters=1.0, seed=k)) for k in (0, 0, 1)]
     one, again, other = (picture(scenario=scenario)[0] for scenario in boards)
     np.testing.assert_array_equal(one, again)
@@ -324,3 +300,94 @@ def test_hog_takes_posters_for_people_now_and_then_and_a_plain_wall_never() -> N
             hit[posters] += len(detector.detect(image)) > 0
     assert hit[0.0] == 0
     assert 1 <= hit[1.0] <= 15
+
+
+HEIGHT, WIDTH, FOCAL = 60, 80, 50.0
+LIGHT = (0.0, -1.0, 0.0, 0.5, 0.5)
+PALETTE = np.arange(512, dtype=np.uint32)
+#: A capsule 3 m away that leans across the image: from (20, 20) for 30 px, radius 6 px.
+STRIP = np.array([[0, 20, 20, 0.8, 0.6, 30, 6, 0, 3, 0, 0.01, 0]], np.float64)
+ELLIPSE = np.array([[0, 40, 30, 1 / 20, 0, 1 / 10, 10, 20, 3, 0, 0, 0.5]], np.float64)
+
+
+def canvas() -> Canvas:
+    empty = Canvas(HEIGHT, WIDTH, FOCAL)
+    empty.begin((0, 0, WIDTH, HEIGHT))
+    return empty
+
+
+def drawn(full: Canvas) -> np.ndarray:
+    depth = np.full((HEIGHT, WIDTH), np.inf, np.float32)
+    full.draw(None, depth, PALETTE)
+    return depth
+
+
+def test_a_strip_holds_the_pixels_within_its_radius_of_its_axis() -> None:
+    full = canvas()
+    full.strips(STRIP, LIGHT)
+    y, x = np.mgrid[:HEIGHT, :WIDTH] - np.array([20, 20])[:, None, None]
+    along = np.clip(0.8 * x + 0.6 * y, 0, 30)
+    away, depth = np.hypot(x - 0.8 * along, y - 0.6 * along), drawn(full)
+    assert np.isinf(depth[away > 5.6]).all()
+    np.testing.assert_allclose(depth[away < 5.4], 3 - 0.01 * np.sqrt(36 - away[away < 5.4] ** 2), rtol=1e-5)
+
+
+def test_an_ellipse_holds_the_pixels_within_its_half_axes() -> None:
+    full = canvas()
+    full.ellipses(ELLIPSE, LIGHT)
+    y, x = np.mgrid[:HEIGHT, :WIDTH] - np.array([30, 40])[:, None, None]
+    inside, depth = 1 - (x / 20) ** 2 - (y / 10) ** 2, drawn(full)
+    assert np.isinf(depth[inside < 0]).all()
+    np.testing.assert_allclose(depth[inside > 0.1], 3 - 0.5 * np.sqrt(inside[inside > 0.1]), rtol=1e-5)
+
+
+def test_only_the_window_is_drawn_into_and_the_count_is_that_of_its_pixels() -> None:
+    part = Canvas(HEIGHT, WIDTH, FOCAL)
+    part.begin((30, 25, 50, 35))
+    part.ellipses(ELLIPSE, LIGHT)
+    depth = np.full((HEIGHT, WIDTH), np.inf, np.float32)
+    owners = np.full((HEIGHT, WIDTH), -1, np.int16)
+    assert part.draw(None, depth, PALETTE, owners, 3) == 200
+    whole = canvas()
+    whole.ellipses(ELLIPSE, LIGHT)
+    np.testing.assert_array_equal(depth[25:35, 30:50], drawn(whole)[25:35, 30:50])
+    assert np.count_nonzero(owners == 3) == np.count_nonzero(np.isfinite(depth)) == 200
+    assert part.seen(depth) == (200, 200, (30, 25, 50, 35))
+    assert part.seen(depth - 1) == (200, 0, (30, 25, 50, 35))
+
+
+@pytest.mark.parametrize("ugly", [math.nan, math.inf, -math.inf, 0.0, 1e300, -1e300])
+def test_any_numbers_are_drawn_without_a_crash(ugly: float) -> None:
+    full = canvas()
+    for column in range(12):
+        for rows, cast in ((STRIP, full.strips), (ELLIPSE, full.ellipses)):
+            row = rows.copy()
+            row[0, column] = ugly
+            cast(row, LIGHT)
+    full.frustum([ugly] * 13, LIGHT)
+    full.slab([ugly] * 17)
+    image = np.zeros((HEIGHT, WIDTH), np.uint32)
+    full.draw(image, np.full((HEIGHT, WIDTH), np.inf, np.float32), PALETTE)
+
+
+FLAT = np.zeros((HEIGHT, WIDTH), np.float32)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        (lambda: Canvas(0, WIDTH, FOCAL), "80 x 0"),
+        (lambda: Canvas(HEIGHT, 20_000, FOCAL), "sides of 1 to 16384"),
+        (lambda: canvas().begin((0, 0, WIDTH + 1, 5)), "not within 80 x 60"),
+        (lambda: canvas().begin((9, 0, 3, 5)), "not within"),
+        (lambda: canvas().strips(np.zeros((3, 11)), LIGHT), "11 numbers; 12"),
+        (lambda: canvas().draw(None, FLAT[1:].copy(), PALETTE), r"\[59, 80\]; \[60, 80\] in C order"),
+        (lambda: canvas().draw(None, np.asfortranarray(FLAT), PALETTE), "C order"),
+        (lambda: canvas().draw(FLAT[:9].astype(np.uint32), FLAT.copy(), PALETTE), r"\[9, 80\]"),
+        (lambda: canvas().draw(None, FLAT.copy(), PALETTE[:0]), "palette is empty"),
+        (lambda: canvas().seen(FLAT[:, 1:].copy()), r"\[60, 79\]"),
+    ],
+)
+def test_what_does_not_fit_the_image_is_refused(wrong: Callable[[], object], told: str) -> None:
+    with pytest.raises(ParameterError, match=told):
+        wrong()

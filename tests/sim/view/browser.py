@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import shutil
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
 from playwright.sync_api import Browser, sync_playwright
+from tests.threads import beside
 
 from limo_hog.detections import Detector
 from limo_hog.live.pace import Pace
@@ -22,7 +22,6 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shuti
 
 @contextmanager
 def chromium(*flags: str) -> Iterator[Browser]:
-    """Run a headless browser."""
     with sync_playwright() as playwright:
         options = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", *flags]
         with playwright.chromium.launch(executable_path=CHROMIUM, args=options) as browser:
@@ -34,14 +33,12 @@ def played(scenario: Scenario, controller: Tunable[Any], detector: Detector, spe
     """Show a run of 90 s, longer than a browser takes to start and look, on a page; end it as fast as it can be."""
     with View(scenario, controller, pace=Pace(speed)) as view:
 
-        def episode() -> None:
+        def episode(_: object) -> None:
             view.end(score(run_episode(scenario, controller, detector, 90.0, 0, watch=view.watch)).to_json())
 
-        run = threading.Thread(target=episode)
-        run.start()
-        try:
-            yield view
-        finally:
-            view.pace.set_speed(0)
-            view.pace.resume()
-            run.join()
+        with beside(episode):
+            try:
+                yield view
+            finally:
+                view.pace.set_speed(0)
+                view.pace.resume()

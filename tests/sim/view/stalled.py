@@ -16,16 +16,13 @@ HANDSHAKE = (
 @contextmanager
 def stalled(url: str, count: int, request: str = HANDSHAKE) -> Iterator[list[socket.socket]]:
     """Open connections that send a request, read the first bytes of an answer to it and then nothing more."""
-    where = urlsplit(url)
-    assert where.hostname
-    assert where.port
+    where, clients = urlsplit(url), []
     with ExitStack() as stack:
-        clients = []
         for _ in range(count):
             client = stack.enter_context(socket.socket())
             client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
             client.settimeout(30)
-            client.connect((where.hostname, where.port))
+            client.connect((str(where.hostname), where.port))
             client.sendall(request.format(host=where.netloc).encode())
             if request == HANDSHAKE:
                 assert b"101 Switching Protocols" in client.recv(1024)

@@ -6,7 +6,6 @@ import math
 import re
 import socket
 import statistics
-import threading
 import time
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -17,7 +16,8 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from tests.sim.logs import card, person, step, steps_of
+from tests.sim.logs import card, person, step, steps_of, there
+from tests.threads import beside
 
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import CONTROLLERS, controller_named
@@ -52,34 +52,31 @@ def test_a_paused_run_goes_on_one_step_at_a_time() -> None:
     pace, ticks = Pace(0), []
     pace.pause()
 
-    def run() -> None:
+    def run(_: object) -> None:
         for tick in range(100):
             pace.wait(tick)
             ticks.append(tick)
 
-    thread = threading.Thread(target=run)
-    thread.start()
-    time.sleep(0.1)
-    assert ticks == []
-    pace.step()
-    time.sleep(0.1)
-    assert ticks == [0]
-    pace.resume()
-    thread.join(5)
+    with beside(run):
+        time.sleep(0.1)
+        assert ticks == []
+        pace.step()
+        time.sleep(0.1)
+        assert ticks == [0]
+        pace.resume()
     assert len(ticks) == 100
 
 
 def test_the_page_is_served_on_loopback_alone() -> None:
+    own = socket.gethostbyname(socket.gethostname())
     with View(WORKSHOP) as view:
         assert view.url.startswith("http://127.0.0.1:")
-        port = int(view.url.rsplit(":", 1)[1].strip("/"))
-        own = socket.gethostbyname(socket.gethostname())
         if not own.startswith("127."):
             with pytest.raises(OSError, match=r"refused"):
-                socket.create_connection((own, port), timeout=2)
+                socket.create_connection((own, int(view.url.rsplit(":", 1)[1].strip("/"))), timeout=2)
 
 
-def test_the_rollouts_on_the_map_begin_at_the_robot_and_the_sent_one_leads_where_it_drives() -> None:
+def test_the_rollouts_on_the_map_begin_at_the_robot_and_lead_where_it_drives() -> None:
     sent, driven = [], []
 
     def watch(step: Step) -> None:
@@ -104,9 +101,7 @@ def test_map_and_distance_are_of_the_person_that_the_followed_box_is_on() -> Non
         followed = followed_person(step)
         if followed is not None and step.seen is not None:
             told.append(followed)
-            error_px, person = figures(step)["error_px"], step.seen.people[followed]
-            assert error_px is not None
-            assert person is not None
+            error_px, person = there(figures(step)["error_px"]), there(step.seen.people[followed])
             # A pinhole camera 8.4 cm ahead of the robot's centre sees them there, give or take an arm.
             ahead = person.distance * math.cos(person.bearing) - LIMO.camera_x
             left = LIMO.focal_px(640) * person.distance * math.sin(person.bearing) / ahead
@@ -157,15 +152,8 @@ def test_a_parameter_brings_its_bounds_unit_and_tooltip() -> None:
         tunable.set(name, value)
         assert tunable.parameters[name].value == value
         assert type(tunable.parameters[name].value) is not type(value)
-    wrong = [
-        ("inner.shown", 3.1),
-        ("inner.hidden", 1.0),
-        ("count", 2.5),
-        ("count", 0),
-        ("gain", True),
-        ("gain", math.nan),
-    ]
-    for name, value in wrong:
+    wrong = [("inner.shown", 3.1), ("inner.hidden", 1.0), ("count", 2.5), ("count", 0), ("gain", True)]
+    for name, value in [*wrong, ("gain", math.nan)]:
         with pytest.raises(ParameterError, match=name):
             tunable.set(name, value)
 
@@ -191,30 +179,25 @@ def test_a_run_goes_on_with_every_parameter_at_its_bound(name: str, bound: str) 
     assert not any("failed" in reason or "finite" in reason for reason in reasons), set(reasons)
 
 
-@pytest.fixture
-def figure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Figure:
+def test_the_figure_shows_titles_and_markers_whole_and_says_where_a_panel_is_empty(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     drawn: list[Figure] = []
     save = Figure.savefig
 
-    def kept(self: Figure, *args: object, **options: object) -> None:
+    def kept(self: Figure, *words: Any, **named: Any) -> None:
         drawn.append(self)
-        save(self, *args, **options)  # type: ignore[arg-type]
+        save(self, *words, **named)
 
     monkeypatch.setattr(Figure, "savefig", kept)
     one = replace(card(step(0, person())), success=False, time_to_find_again_s=None, intrusion_personal=0.0)
     plot(summarise([one, replace(one, seed=1)]), tmp_path / "a.png")
-    return drawn[0]
-
-
-def test_no_title_is_cut_off(figure: Figure) -> None:
+    (figure,) = drawn
     canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
     titles = [axes._left_title.get_window_extent(canvas.get_renderer()) for axes in figure.axes]  # type: ignore[attr-defined]
     assert all(left.x1 < right.x0 for left, right in pairwise(titles))
     assert titles[-1].x1 < figure.bbox.x1
-
-
-def test_a_marker_at_0_is_whole_and_an_empty_panel_says_so(figure: Figure) -> None:
     assert all(axes.get_xlim()[0] < 0 for axes in figure.axes)
     said = [[text.get_text() for text in axes.texts] for axes in figure.axes]
     assert said[3] == ["no data"]

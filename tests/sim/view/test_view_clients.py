@@ -12,8 +12,8 @@ import socket
 import threading
 import time
 import weakref
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import AsyncIterator, Iterator
+from contextlib import ExitStack, asynccontextmanager, contextmanager, suppress
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -21,6 +21,7 @@ import aiohttp
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tests.sim.logs import there
 from tests.sim.view.stalled import HANDSHAKE, stalled
 from tests.threads import beside
 
@@ -47,10 +48,14 @@ def steps() -> list[Step]:
 
 
 def pictured(step: Step, image: NDArray[np.uint8]) -> Step:
-    """Return a step whose frame shows another image."""
-    assert step.log.frame is not None
-    frame = dataclasses.replace(step.log.frame, image=image)
+    frame = dataclasses.replace(there(step.log.frame), image=image)
     return dataclasses.replace(step, log=dataclasses.replace(step.log, frame=frame))
+
+
+@asynccontextmanager
+async def page_of(view: View) -> AsyncIterator[Any]:
+    async with aiohttp.ClientSession() as session, session.ws_connect(view.url + "live", max_msg_size=0) as page:
+        yield page
 
 
 @contextmanager
@@ -88,7 +93,7 @@ def test_a_client_that_does_not_read_is_dropped(steps: list[Step], monkeypatch: 
     monkeypatch.setattr("limo_hog.live.server.STALL_S", 1.0)
 
     async def pictures(view: View, seconds: float) -> int:
-        async with aiohttp.ClientSession() as session, session.ws_connect(view.url + "live", max_msg_size=0) as page:
+        async with page_of(view) as page:
             count, until = 0, time.monotonic() + seconds
             while time.monotonic() < until:
                 count += (await page.receive(timeout=5)).type is aiohttp.WSMsgType.BINARY
@@ -109,8 +114,7 @@ def test_clients_that_do_not_read_keep_no_frames_of_the_run(steps: list[Step]) -
 
     def show(view: View) -> None:
         for step in steps:
-            assert step.log.frame
-            image = step.log.frame.image.copy()
+            image = there(step.log.frame).image.copy()
             images.append(weakref.ref(image))
             view.watch(pictured(step, image))
             del image
@@ -136,7 +140,7 @@ def test_ten_pages_share_their_pictures(steps: list[Step], monkeypatch: pytest.M
     monkeypatch.setattr(View, "_pictures", count)
 
     async def look(view: View) -> None:
-        async with aiohttp.ClientSession() as session, session.ws_connect(view.url + "live", max_msg_size=0) as page:
+        async with page_of(view) as page:
             while (await page.receive(timeout=5)).type is not aiohttp.WSMsgType.BINARY:
                 pass
 
@@ -226,9 +230,7 @@ def test_a_page_asked_for_by_a_name_answers_to_it() -> None:
         assert access.admits("robot.lab:8488", "http://robot.lab:8488")
         assert not access.admits("evil.lab:8488", "http://evil.lab:8488")
         assert access.admits("192.0.2.7:8488", None) is not loopback
-
-
-def test_a_mapped_loopback_address_is_loopback() -> None:
+    # A mapped loopback address is loopback.
     assert Access.at("::ffff:127.0.0.1", ["::ffff:127.0.0.1"]).loopback
     assert not Access.at("localhost", ["127.0.0.1", "192.0.2.7"]).loopback
 
@@ -238,18 +240,16 @@ def test_every_answer_has_the_headers_that_keep_other_code_out(path: str) -> Non
     with View(WORKSHOP) as view:
         _, headers = _status(view, path, {"Host": urlsplit(view.url).netloc})
     policy = dict(rule.strip().partition(" ")[::2] for rule in headers["content-security-policy"].split(";"))
-    assert policy["default-src"] == "'none'"
+    assert policy["default-src"] == policy["frame-ancestors"] == "'none'"
     assert policy["script-src"] == policy["style-src"] == "'self'"
-    assert policy["frame-ancestors"] == "'none'"
-    assert headers["x-content-type-options"] == "nosniff"
-    assert headers["x-frame-options"] == "DENY"
+    assert (headers["x-content-type-options"], headers["x-frame-options"]) == ("nosniff", "DENY")
 
 
 def _answer(view: View, text: str | bytes) -> dict[str, Any] | None:
     """What the page is told after a control message: a complaint, or None where the connection is closed."""
 
     async def ask() -> dict[str, Any] | None:
-        async with aiohttp.ClientSession() as session, session.ws_connect(view.url + "live", max_msg_size=0) as page:
+        async with page_of(view) as page:
             assert (await page.receive_json(timeout=10))["scenario"] == "workshop"
             await (page.send_bytes(text) if isinstance(text, bytes) else page.send_str(text))
             message = await page.receive(timeout=10)
@@ -258,36 +258,20 @@ def _answer(view: View, text: str | bytes) -> dict[str, Any] | None:
     return asyncio.run(ask())
 
 
+NONSENSE = ["", "[]", "{}", "1e999", '"set"', '{"do": "fly"}', '{"do": ["pause"]}', '{"do": "speed"}', "[" * 1000]
+NONSENSE += [f'{{"do": "speed", "value": {value}}}' for value in ("-1", "true", "NaN", "9" * 400, "1e308")]
+NONSENSE += [f'{{"set": "target_distance", "value": {value}}}' for value in ("1e308", "9" * 400, '"1"', "null")]
+NONSENSE += ['{"set": "x", "value": 1}', '{"set": ["target_distance"], "value": 1}', '{"set": "target_distance"}']
+
+
 @pytest.mark.parametrize(
-    "text",
-    [
-        "",
-        "[]",
-        "{}",
-        "1e999",
-        '"set"',
-        '{"do": "fly"}',
-        '{"do": ["pause"]}',
-        '{"do": "speed"}',
-        *(f'{{"do": "speed", "value": {value}}}' for value in ("-1", "true", "NaN", "9" * 400, "1e308")),
-        '{"set": "x", "value": 1}',
-        '{"set": ["target_distance"], "value": 1}',
-        *(f'{{"set": "target_distance", "value": {value}}}' for value in ("1e308", "9" * 400, '"1"', "null")),
-        '{"set": "target_distance"}',
-        "[" * 1000,
-        '{"do":' * 150,
-        b"\xff\xfe",
-        b'{"do": "pause"}',
-    ],
-    ids=lambda text: repr(text)[:40],
+    "text", [*NONSENSE, '{"do":' * 150, b"\xff\xfe", b'{"do": "pause"}'], ids=lambda text: repr(text)[:40]
 )
 def test_a_control_message_that_makes_no_sense_is_answered_and_changes_nothing(text: str | bytes, quiet: None) -> None:
     controller: Tunable[Any] = Tunable(controller_named("tracking", None))
     before = controller.parameters
     with View(WORKSHOP, controller, pace=Pace(2)) as view:
-        answer = _answer(view, text)
-        assert answer is not None
-        assert len(answer["complaint"]) < 1000
+        assert len(there(_answer(view, text))["complaint"]) < 1000
         assert (view.pace.speed, view.pace.paused) == (2, False)
     assert controller.parameters == before
 

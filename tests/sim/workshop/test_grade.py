@@ -21,19 +21,11 @@ from limo_sim.workshop.grade import grade, nodes_in
 LOOP = "while True:\n    try:\n        n = 0\n        while True: n += 1\n    except BaseException: pass\n"
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("import subprocess\nsubprocess.Popen(['sleep', '600'])\n" + LOOP, "it took no interrupt"),
-        ("import os\nos._exit(0)\n", "status 0"),
-        ("keep = bytearray(10 * 10**9)\n", "MemoryError"),
-    ],
-)
-def test_a_hostile_node_ends_within_its_limits_and_gets_no_points(tmp_path: Path, text: str, said: str) -> None:
-    written(tmp_path, node=text)
+def test_a_hostile_node_ends_within_its_limits_and_gets_no_points(tmp_path: Path) -> None:
+    written(tmp_path, node="import subprocess\nsubprocess.Popen(['sleep', '600'])\n" + LOOP)
     (graded,) = grade(nodes_in(tmp_path), tmp_path, 1, "follower", Limits(patience=2.0, seconds=60.0))
     assert graded.result is not None and graded.result["points"] == 0
-    assert said in graded.result["checkpoints"][0]["evidence"]
+    assert "it took no interrupt" in graded.result["checkpoints"][0]["evidence"]
 
 
 def test_what_is_no_file_costs_its_own_row_alone(tmp_path: Path) -> None:
@@ -47,10 +39,9 @@ def test_what_is_no_file_costs_its_own_row_alone(tmp_path: Path) -> None:
     written(folder / "lou", node=deep)
     before = set(Path(tempfile.gettempdir()).glob("limo-hog-*"))
     rows = table_of(folder)
-    assert len(rows) == 7
+    assert len(rows) == 7 and {row["points"] for row in rows.values()} == {"0"}
     assert rows["amy.py"]["first_mistake"].startswith("the camera image is shown")
     assert rows["kim\\xe9.py"]["max_points"] == "100"
-    assert {rows[name]["points"] for name in rows} == {"0"}
     assert rows["ian.py"]["first_mistake"] == "it cannot be graded: it is no regular file"
     for name in ("bob.py", "eve.py"):
         assert rows[name]["first_mistake"].startswith("it cannot be graded: ")

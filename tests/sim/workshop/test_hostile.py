@@ -102,7 +102,7 @@ FILES = {
 THEN = f"self.n = getattr(self, 'n', 0) + 1\nif self.n < 3:\n    {DRIVE}\n    return\n"
 HOSTILE = {name: (HEAD + node(THEN + body), said) for name, (body, said) in IN_A_CALLBACK.items()} | FILES
 #: Of these, those that are tried with every change; the others are marked slow.
-QUICK = ("exit 0", "segfault", "daemon", "own file deleted", "forged messages")
+QUICK = ("exit 0", "segfault", "daemon", "own file deleted", "forged messages", "memory", "ignored alarm")
 
 
 def left_running() -> list[str]:
@@ -155,25 +155,27 @@ def test_a_node_that_shows_pictures_without_end_is_stopped() -> None:
         take.shown("a", shown)
 
 
-def test_a_process_that_waited_for_a_node_and_was_killed_is_replaced(tmp_path: Path) -> None:
-    script = tmp_path / "node.py"
-    script.write_text("raise SystemExit(3)\n")
+@pytest.fixture
+def exits(tmp_path: Path) -> Path:
+    (tmp_path / "node.py").write_text("raise SystemExit(3)\n")
+    return tmp_path / "node.py"
+
+
+def test_a_process_that_waited_for_a_node_and_was_killed_is_replaced(exits: Path) -> None:
     with worker.ready() as waiting:
         pass
     worker.idle.append(waiting)
     waiting.kill()
-    assert "sys.exit(3)" in examine(script, limits=LIMITS).verdicts[0].evidence
+    assert "sys.exit(3)" in examine(exits, limits=LIMITS).verdicts[0].evidence
 
 
-def test_a_process_that_was_told_to_leave_gets_no_other_node(tmp_path: Path) -> None:
-    script = tmp_path / "node.py"
-    script.write_text("raise SystemExit(3)\n")
+def test_a_process_that_was_told_to_leave_gets_no_other_node(exits: Path) -> None:
     for _ in range(5):
-        examine(script, limits=LIMITS)
+        examine(exits, limits=LIMITS)
         with worker.ready() as waiting, worker.no_nodes(), pytest.raises(StubError), worker.ready():
             pass
         assert waiting not in worker.idle
-        assert "sys.exit(3)" in examine(script, limits=LIMITS).verdicts[0].evidence
+        assert "sys.exit(3)" in examine(exits, limits=LIMITS).verdicts[0].evidence
 
 
 def test_the_line_of_a_crash_is_told(tmp_path: Path) -> None:

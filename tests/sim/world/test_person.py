@@ -53,27 +53,20 @@ def test_headings_change_smoothly_and_follow_the_way() -> None:
     assert math.remainder(there(walk.pose(20.0)).yaw + math.pi / 2, math.tau) == pytest.approx(0, abs=1e-9)
 
 
-def test_the_gait_is_tied_to_the_distance_walked() -> None:
+def test_the_gait_is_tied_to_the_distance_walked_and_limbs_rest_in_a_pause() -> None:
     for speed in (0.2, 0.8):
         walk = Walk(Person(route=((-3, 0, 0), (3, 0, 0)), speed=speed))
         for metres in (0.1, 0.5, 1.3, 2.9):
             assert there(walk.pose(metres / speed)).phase == pytest.approx(math.tau * metres / 0.75 % math.tau)
+    pauses = Walk(Scenario.load("followable").people[0])
+    assert (there(pauses.pose(1.7 / 0.22 + 2.0)).swing, there(pauses.pose(4.0)).swing) == (0, 1)
 
 
-def test_a_person_who_pauses_stands_with_limbs_at_rest() -> None:
-    walk = Walk(Scenario.load("followable").people[0])
-    assert there(walk.pose(1.7 / 0.22 + 2.0)).swing == 0
-    assert there(walk.pose(4.0)).swing == 1
-
-
-def test_a_person_who_left_is_not_there_any_more() -> None:
+def test_a_person_is_there_until_they_leave_and_one_corner_means_standing() -> None:
     walk = Walk(Person(route=((2, 1, 0), (2, -1, 0)), arrives_s=1.0, leaves_s=4.0))
     assert [walk.pose(time) is not None for time in (0.9, 1.0, 3.99, 4.0, 100.0)] == [False, True, True, False, False]
-
-
-def test_one_corner_means_standing() -> None:
-    walk = Walk(Person(route=((2, 1, 0),), facing=1.0))
-    assert walk.pose(0.0) == walk.pose(100.0) == Pose(2, 1, 1.0)
+    stands = Walk(Person(route=((2, 1, 0),), facing=1.0))
+    assert stands.pose(0.0) == stands.pose(100.0) == Pose(2, 1, 1.0)
 
 
 @pytest.mark.parametrize("height", [0.8, 0.9, 1.1, 2.0])
@@ -87,15 +80,10 @@ def test_the_lowest_foot_touches_the_floor_and_the_head_is_at_full_height(height
 
 
 def test_the_standing_foot_does_not_slide() -> None:
-    """While a leg carries the body, its ankle stays where it is on the floor, to within a few centimetres."""
     walk = Walk(Person(route=((-3, 0, 0), (3, 0, 0)), speed=0.5))
-    person = walk.person
-    held = []
-    for step in range(50, 150):
-        ankles = body(person, there(walk.pose(step / 50))).end[[1, 4]]
-        held.append(min(ankles.tolist(), key=lambda ankle: ankle[2]))
-    speeds = np.abs(np.diff(np.array(held)[:, 0])) * 50
-    assert np.median(speeds) < 0.5 * person.speed
+    ankles = [body(walk.person, there(walk.pose(step / 50))).end[[1, 4]].tolist() for step in range(50, 150)]
+    held = [min(two, key=lambda ankle: ankle[2])[0] for two in ankles]
+    assert np.median(np.abs(np.diff(held)) * 50) < 0.5 * walk.person.speed
 
 
 def test_a_turned_body_is_the_same_body_turned() -> None:

@@ -121,8 +121,7 @@ def written(folder: Path, text: str) -> Path:
 @pytest.mark.parametrize("name", Scenario.names())
 def test_every_scenario_loads_and_runs(name: str) -> None:
     scenario = Scenario.load(name)
-    assert scenario.name == name
-    assert scenario.summary
+    assert scenario.name == name and scenario.summary
     arena = Arena(scenario, 0)
     arena.step()
     assert arena.frame().image.shape == (480, 640, 3)
@@ -130,10 +129,8 @@ def test_every_scenario_loads_and_runs(name: str) -> None:
 
 def test_a_file_without_a_name_is_called_by_its_own(tmp_path: Path) -> None:
     path = written(tmp_path, "[[people]]\nroute = [[2, 0, 0]]\n[camera]\nlatency_s = 0.4\n")
-    scenario = Scenario.load(path)
-    assert scenario.name == "mine"
-    assert scenario.camera == Camera(latency_s=0.4)
-    assert scenario.people == (Person(route=((2.0, 0.0, 0.0),)),)
+    person = Person(route=((2.0, 0.0, 0.0),))
+    assert Scenario.load(path) == Scenario("mine", camera=Camera(latency_s=0.4), people=(person,))
 
 
 @pytest.mark.parametrize(("text", "message"), REFUSED)
@@ -145,20 +142,15 @@ def test_bad_data_is_refused_with_file_key_and_range(tmp_path: Path, text: str, 
     assert isinstance(caught.value, LimoHogError)
 
 
-def test_a_missing_file_and_an_unknown_name_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match=r"nowhere\.toml: cannot be read"):
-        Scenario.load(tmp_path / "nowhere.toml")
-    with pytest.raises(ScenarioError, match=r"unknown scenario wrokshop: want one of .*workshop, "):
-        Scenario.load("wrokshop")
-    with pytest.raises(ScenarioError, match="unknown scenario wrokshop:3"):
-        Scenario.load("wrokshop:3")
-
-
-def test_a_replaced_scenario_is_checked_when_the_arena_is_built() -> None:
-    followable = Scenario.load("followable")
-    half = dataclasses.replace(followable, camera=dataclasses.replace(followable.camera, drop_probability=0.5))
-    Arena(half, 0)
-    inside = dataclasses.replace(followable, furniture=(Furniture("cone", 0.1, 0.0),))
+def test_a_missing_file_an_unknown_name_and_a_wrong_replacement_are_refused(tmp_path: Path) -> None:
+    for name, told in (
+        (tmp_path / "nowhere.toml", r"nowhere\.toml: cannot be read"),
+        ("wrokshop", "unknown scenario wrokshop: want one of .*workshop, "),
+        ("wrokshop:3", "unknown scenario wrokshop:3"),
+    ):
+        with pytest.raises(ScenarioError, match=told):
+            Scenario.load(name)
+    inside = dataclasses.replace(Scenario.load("followable"), furniture=(Furniture("cone", 0.1, 0.0),))
     with pytest.raises(ScenarioError, match="scenario 'followable': furniture"):
         Arena(inside, 0)
 
@@ -215,14 +207,11 @@ def test_a_seed_draws_clothes_stature_speed_and_places_within_what_is_asked_for(
     assert max(heights) - min(heights) > 0.15 * PLAIN.people[0].height
 
 
-def test_what_is_not_asked_for_stays() -> None:
+def test_what_is_not_asked_for_stays_and_people_that_do_not_fit_are_refused() -> None:
     run = of_run(dataclasses.replace(PLAIN, vary=Vary(speed=0.5)), 5)
     assert run.people[0].speed != PLAIN.people[0].speed
     for person, plain in zip(run.people, PLAIN.people, strict=True):
         assert dataclasses.replace(person, speed=plain.speed) == plain
-
-
-def test_people_that_do_not_fit_are_refused_by_name() -> None:
     tall = dataclasses.replace(DRAWN, people=tuple(Person(route=((3.0, 0.0, 0.0),), height=2.0) for _ in range(16)))
     with pytest.raises(ScenarioError, match="vary: no people that fit found"):
         of_run(tall, 0)

@@ -175,11 +175,11 @@ class Live(ABC, Generic[Moment]):
     async def _start(self) -> None:
         app = web.Application(middlewares=[self._guard])
         app.on_response_prepare.append(_add_headers)
-        # The styles are those of every page; the rest of `limo_hog.live` is the page of films.
-        own = [file for file in files(self._package).joinpath("page").iterdir() if file.name != "view.css"]
-        for file in (files("limo_hog.live").joinpath("page").joinpath("view.css"), *own):
-            where = "/" if file.name == "index.html" else f"/{file.name}"
-            app.router.add_get(where, partial(_file, file.read_bytes(), _KINDS[file.name.rpartition(".")[2]]))
+        # Styles and connection are those of every page; the rest of `limo_hog.live` is the page of films.
+        folders = [files(package).joinpath("page") for package in ("limo_hog.live", self._package)]
+        for name, file in {file.name: file for folder in folders for file in folder.iterdir()}.items():
+            where, kind = "/" if name == "index.html" else f"/{name}", _KINDS[name.rpartition(".")[2]]
+            app.router.add_get(where, partial(_file, file.read_bytes(), kind))
         app.router.add_get("/live", self._live)
         logger: Any = QuietLogger(logging.getLogger("limo_hog.live"), {})
         # Connections that ask nothing, or never finish asking, do not hold up the end.

@@ -40,7 +40,6 @@ STREAM_TIMEOUT_S = 10
 #: How long is waited before a live source that broke off is opened again [s]: after the last of them it is given up.
 RETRY_AFTER_S = (1, 2, 4, 8, 16, 32)
 
-
 #: Number, uint8 (height, width, 3) BGR and time [s] of a frame.
 LiveFrame = tuple[int, NDArray[np.uint8], float]
 
@@ -263,12 +262,8 @@ def newest_frames(
 ) -> Generator[LiveFrame, None, None]:
     """Yield the newest frame of a camera or a stream; `drop` is called for each that nobody took in time.
 
-    A thread reads it, which owns the open video from now on; `opened` closes that.
-
-    Raises
-    ------
-    ReadError
-        The source never sent a frame, or did not come back.
+    A thread reads it, which owns the open video from now on; `opened` closes that. Raises `ReadError` where the source
+    never sent a frame, or did not come back.
     """
     held: queue.Queue[LiveFrame | BaseException | None] = queue.Queue(1)
     stopped = threading.Event()

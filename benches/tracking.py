@@ -1,14 +1,14 @@
 """Identities by tracker: HOTA, IDF1, MOTA and switches on TUD-Stadtmitte and five sequences of the arena.
 
-    uv run python benches/tracking.py ../shared/data --frames TUD
+    uv run python benches/tracking.py ../shared/data TUD
 
 prints the table of docs/detect.md. TUD is a folder with frames 1 to 41 (docs/models.md says where they are).
 """
 
 from __future__ import annotations
 
-import argparse
 import itertools
+import sys
 import tempfile
 from collections import ChainMap
 from collections.abc import Iterable, Iterator
@@ -71,20 +71,17 @@ def write(path: Path, frames: Iterable[Iterable[Person]]) -> None:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("data", type=Path)
-    parser.add_argument("--frames", type=Path, required=True)
-    args = parser.parse_args()
-    truth = args.data / "real" / "annotations" / "TUD-Stadtmitte_gt.txt"
+    data, frames = map(Path, sys.argv[1:])
     # The smallest person of TUD is as docs/models.md has it.
-    sets = {"TUD 1–41": (96, 25, {"TUD 1–41": tud(args.frames, truth)})}
+    stadtmitte = tud(frames, data / "real" / "annotations" / "TUD-Stadtmitte_gt.txt")
+    sets = {"TUD 1–41": (96, 25, {"TUD 1–41": stadtmitte})}
     sets["arena, all five"] = (64, ARENA_HZ, {name: arena(name) for name in SCENARIOS})
     print("|  | tracker | HOTA | IDF1 | MOTA | recall | precision | switches |\n|---|---|---|---|---|---|---|---|")
     for group, (min_height, fps, sequences) in sets.items():
         with tempfile.TemporaryDirectory() as folder:
             detector = PeopleDetector(threshold=Tracker().lowest, min_height=min_height)
-            for name, frames in sequences.items():
-                images, people = zip(*frames, strict=True)
+            for name, sequence in sequences.items():
+                images, people = zip(*sequence, strict=True)
                 found = [detector.detect(image) for image in images]
                 write(Path(folder, "truth", f"{name}.txt"), people)
                 for how in ("none", *TRACKERS):

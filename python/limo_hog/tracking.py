@@ -40,12 +40,7 @@ class Tracker:
     fps
         Pictures a second [Hz].
 
-    Raises
-    ------
-    ParameterError
-        There is no tracker of this name.
-    MissingExtraError
-        `trackers` is not installed.
+    Raises `ParameterError` for another name, `MissingExtraError` where `trackers` is not installed.
     """
 
     def __init__(self, name: str = "bytetrack", threshold: float | None = None, fps: float = 25.0) -> None:
@@ -55,9 +50,8 @@ class Tracker:
             import trackers
         from supervision import ColorLookup, Position, TraceAnnotator
 
-        self._trails = TraceAnnotator(
-            position=Position.BOTTOM_CENTER, trace_length=round(2 * fps), color_lookup=ColorLookup.TRACK
-        )
+        feet, by_number = Position.BOTTOM_CENTER, ColorLookup.TRACK
+        self._trails = TraceAnnotator(position=feet, trace_length=round(2 * fps), color_lookup=by_number)
         self._tracker = getattr(trackers, TRACKERS[name])(frame_rate=fps, **_SETTINGS)
         limo = load_model("limo")
         self.set_threshold((limo.second_look or limo).threshold if threshold is None else threshold)

@@ -19,8 +19,8 @@ import cv2
 import numpy as np
 import pytest
 from playwright.sync_api import expect
-from pytest import CaptureFixture, MonkeyPatch
-from tests.cli.material import LIMO_HOG, PICTURE, film_of, frames_of, lines_of
+from pytest import MonkeyPatch
+from tests.cli.material import LIMO_HOG, PICTURE, AnswerTo, film_of, frames_of, lines_of
 from tests.sim.view.browser import CHROMIUM, chromium
 
 from limo_hog import Detections, PeopleDetector
@@ -36,8 +36,7 @@ def test_people_of_a_film_are_numbered_in_every_format(tmp_path: Path) -> None:
     assert main(["detect", str(film), "--track", "--out", str(tmp_path / "out"), *options]) == 0
     assert frames_of(tmp_path / "out" / "walk.mp4") == 12
     results = lines_of(names["json"].read_text())
-    each = [(result["frame"], *one) for result in results for one in zip(result["ids"], result["boxes"], strict=True)]
-    known = [(frame, who, *box) for frame, who, box in each]
+    known = [(one["frame"], who, *box) for one in results for who, box in zip(one["ids"], one["boxes"], strict=True)]
     assert max(Counter(who for _, who, *_ in known).values()) >= 8  # the street moves by 4 px a frame
     rows = csv.DictReader(names["csv"].read_text().splitlines())
     assert [tuple(int(row[name]) for name in ("frame", "id", *"xywh")) for row in rows] == known
@@ -63,10 +62,9 @@ with video_writer(pathlib.Path(sys.argv[1]), fps=25) as write:
 
 
 def test_a_film_is_of_the_same_bytes_whatever_was_in_memory(tmp_path: Path) -> None:
-    for junk in ("1", "200"):
-        # What glibc fills memory with that was never written.
-        environment = os.environ | {"MALLOC_PERTURB_": junk}
-        subprocess.run([sys.executable, "-c", _WRITTEN, str(tmp_path / junk)], check=True, env=environment)
+    for junk in ("1", "200"):  # what glibc fills memory with that was never written
+        command = [sys.executable, "-c", _WRITTEN, str(tmp_path / junk)]
+        subprocess.run(command, check=True, env=os.environ | {"MALLOC_PERTURB_": junk})
     assert (tmp_path / "1").read_bytes() == (tmp_path / "200").read_bytes()
 
 
@@ -92,12 +90,9 @@ def play(monkeypatch: MonkeyPatch, *captures: Mock) -> None:
     monkeypatch.setattr(reading, "RETRY_AFTER_S", (0.01, 0.02, 0.04))
 
 
-SLOW = pytest.param(7500, marks=[pytest.mark.slow, pytest.mark.timeout(600)])
-
-
-@pytest.mark.parametrize("frames", [75, SLOW])
+@pytest.mark.parametrize("frames", [75, pytest.param(7500, marks=[pytest.mark.slow, pytest.mark.timeout(600)])])
 def test_a_detector_slower_than_a_camera_gets_its_newest_frame(
-    frames: int, monkeypatch: MonkeyPatch, capsys: CaptureFixture[str]
+    frames: int, monkeypatch: MonkeyPatch, answer_to: AnswerTo
 ) -> None:
     camera, behind = capture(frames, period_s=0.04), []
 
@@ -108,32 +103,26 @@ def test_a_detector_slower_than_a_camera_gets_its_newest_frame(
 
     monkeypatch.setattr(PeopleDetector, "detect", slow)
     play(monkeypatch, camera)
-    assert main(["detect", "0"]) == 0
+    code, _, said = answer_to("detect", 0)
+    assert code == 0 and f"{frames - len(behind)} frames dropped" in said
     assert max(behind) <= 2
     assert len(behind) < frames / 3
-    assert f"{frames - len(behind)} frames dropped" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
-    ("then", "code", "said"),
-    [
-        ((0, 0, 4), 0, "broke off after 7 frames; trying again for 0.07 s"),
-        ((0, 0, 0), 1, "broke off after 3 frames, and did not come back"),
-    ],
+    ("last", "code", "said"), [(4, 0, "7 frames; trying again for 0.07 s"), (0, 1, "3 frames, and did not come back")]
 )
 def test_a_stream_that_breaks_off_is_one_line_and_comes_back_or_fails(
-    then: tuple[int, ...], code: int, said: str, monkeypatch: MonkeyPatch, tmp_path: Path, capsys: CaptureFixture[str]
+    last: int, code: int, said: str, monkeypatch: MonkeyPatch, tmp_path: Path, answer_to: AnswerTo
 ) -> None:
-    play(monkeypatch, *map(capture, (3, *then)))
-    assert main(["detect", "rtsp://camera/live", "--out", str(tmp_path), "--json", "-"]) == code
-    shown = capsys.readouterr()
-    numbers = [result["frame"] for result in lines_of(shown.out)]
-    assert numbers == sorted(set(numbers))
-    assert numbers[-1] == 2 + sum(then)
+    play(monkeypatch, *map(capture, (3, 0, 0, last)))
+    answer = answer_to("detect", "rtsp://camera/live", "--out", tmp_path, "--json", "-")
+    numbers = [result["frame"] for result in lines_of(answer.out)]
+    assert answer.code == code and numbers == sorted(set(numbers)) and numbers[-1] == 2 + last
     assert frames_of(tmp_path / "live.mp4") == len(numbers)
-    first = "broke off after 3 frames; trying again for 0.07 s"
-    told = [line for line in shown.err.splitlines() if "broke off" in line]
-    assert told == [f"limo-hog: rtsp://camera/live: {line}" for line in (first, said)]
+    told = [line for line in answer.err.splitlines() if "broke off" in line]
+    lines = ("3 frames; trying again for 0.07 s", said)
+    assert told == [f"limo-hog: rtsp://camera/live: broke off after {line}" for line in lines]
 
 
 #: `detect` of a camera of 50/s, which ends in a kill.

@@ -175,17 +175,11 @@ def test_a_port_in_use_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert "give --view another port" in complaint
 
 
-@pytest.mark.parametrize(
-    ("option", "file", "room"),
-    [
-        ("--video", "run.mp4", 0),
-        ("--video", "run.mp4", 40_000),
-        ("--record", "run.mcap", 0),
-        ("--record", "run.mcap", 40_000),
-        ("--plot", "run.png", 300),
-        ("--json", "run.json", 300),
-    ],
-)
+FULL = [("--video", "run.mp4", 0), ("--video", "run.mp4", 40_000), ("--record", "run.mcap", 0)]
+FULL += [("--record", "run.mcap", 40_000), ("--plot", "run.png", 300), ("--json", "run.json", 300)]
+
+
+@pytest.mark.parametrize(("option", "file", "room"), FULL)
 def test_a_full_disk_is_one_line_and_leaves_nothing(option: str, file: str, room: int, tmp_path: Path) -> None:
     done = on_a_full_disk(room, "follow", "--seconds", "3", option, str(tmp_path / file))
     assert done.returncode == 1
@@ -193,16 +187,20 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(option: str, file: str, room
     assert list(tmp_path.iterdir()) == []
 
 
-def _started(folder: Path, *options: str) -> tuple[subprocess.Popen[str], Path, Path]:
-    film, bag = folder / "run.mp4", folder / "run.mcap"
-    command = [str(LIMO_HOG), "follow", "--seconds", "3600", "--video", str(film), "--record", str(bag), *options]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    return process, film, bag
+def _started(*options: object, seconds: int = 3600, by: tuple[str, ...] = ()) -> subprocess.Popen[str]:
+    command = [*by, str(LIMO_HOG), "follow", "--seconds", str(seconds), *map(str, options)]
+    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+
+
+def _address(run: subprocess.Popen[str]) -> str:
+    assert run.stderr is not None
+    return run.stderr.readline().split()[-1]
 
 
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 def test_a_run_that_is_stopped_leaves_whole_files(name: str, tmp_path: Path) -> None:
-    process, film, bag = _started(tmp_path)
+    film, bag = tmp_path / "run.mp4", tmp_path / "run.mcap"
+    process = _started("--video", film, "--record", bag)
     deadline = time.monotonic() + 60
     while not any(part.stat().st_size > 1_000_000 for part in tmp_path.glob(".run.part-*.mcap")):
         assert time.monotonic() < deadline
@@ -223,8 +221,8 @@ SLOW = [pytest.param(seed, marks=[pytest.mark.slow, pytest.mark.timeout(1800)]) 
 
 @pytest.mark.parametrize("seed", [0, *SLOW])
 def test_a_run_stopped_at_any_moment_leaves_whole_files_or_none(seed: int, tmp_path: Path) -> None:
-    rng = random.Random(seed)
-    process, film, bag = _started(tmp_path)
+    rng, film, bag = random.Random(seed), tmp_path / "run.mp4", tmp_path / "run.mcap"
+    process = _started("--video", film, "--record", bag)
     time.sleep(rng.uniform(0.2, 5.0))
     for _ in range(rng.randint(1, 3)):
         process.send_signal(rng.choice((signal.SIGINT, signal.SIGTERM, signal.SIGHUP)))
@@ -254,47 +252,34 @@ def test_a_run_that_is_stopped_before_its_first_frame_was_stopped(
 
 
 def test_a_closed_terminal_does_not_stop_what_nohup_started(tmp_path: Path) -> None:
-    command = ["nohup", str(LIMO_HOG), "follow", "--seconds", "4", "--json", str(tmp_path / "card.json")]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    process = _started("--json", tmp_path / "card.json", seconds=4, by=("nohup",))
     time.sleep(1.5)
     process.send_signal(signal.SIGHUP)
-    assert process.wait(60) == 0
-    assert (tmp_path / "card.json").exists()
+    process.communicate(timeout=60)
+    assert process.returncode == 0 and (tmp_path / "card.json").exists()
 
 
 def test_pages_that_do_not_read_hold_no_score_card_up(tmp_path: Path) -> None:
-    command = [str(LIMO_HOG), "follow", "--seconds", "4", "--view", "0", "--json", str(tmp_path / "card.json")]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-    assert process.stderr is not None
-    with stalled(process.stderr.readline().split()[-1], 10):
+    process = _started("--view", 0, "--json", tmp_path / "card.json", seconds=4)
+    with process, stalled(_address(process), 10):
         began = time.monotonic()
         assert process.wait(60) == 0
         assert time.monotonic() - began < 20
-    process.stderr.close()
     assert json.loads((tmp_path / "card.json").read_text())["seconds"] == pytest.approx(4)
 
 
-async def _text(page: Any) -> str:
-    message = await page.receive(timeout=30)
-    return str(message.data) if message.type is aiohttp.WSMsgType.TEXT else ""
-
-
 def test_ctrl_c_ends_a_run_that_is_paused_on_its_page() -> None:
-    command = [str(LIMO_HOG), "follow", "--seconds", "3600", "--view", "0"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert process.stderr is not None
-    url = process.stderr.readline().split()[-1]
+    process = _started("--view", 0)
 
     async def pause() -> None:
-        async with aiohttp.ClientSession() as session, session.ws_connect(url + "live") as page:
+        async with aiohttp.ClientSession() as session, session.ws_connect(_address(process) + "live") as page:
             await page.send_str('{"do": "pause"}')
-            told = ""
-            while '"paused": true' not in told:
-                told = await _text(page)
+            while '"paused": true' not in str((await page.receive(timeout=30)).data):
+                pass
             process.send_signal(signal.SIGINT)
             # The page is told that it is over.
-            while '"ended"' not in told:
-                told = await _text(page)
+            while '"ended"' not in str((await page.receive(timeout=30)).data):
+                pass
 
     asyncio.run(pause())
     assert process.communicate(timeout=30)[1] == "limo-hog: stopped\n"

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from urllib.parse import urlsplit
 
 import cv2
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import limo_hog
 from limo_hog import Detections, PeopleDetector
@@ -21,12 +21,7 @@ from limo_hog.models import Calibration, PersonBox
 from limo_hog.suppression import intersection_over_union, share_inside
 
 PHOTOGRAPHS = Path(__file__).parents[3] / "shared" / "data" / "real" / "pedestrians"
-Image = NDArray[np.uint8]
-
-
-@cache
-def picture() -> Image:
-    return street(640, 480, 3)
+PICTURE = street(640, 480, 3)
 
 
 def some() -> Detections:
@@ -66,7 +61,7 @@ def test_no_detections_are_empty_arrays() -> None:
 
 def test_opencvs_models_have_a_calibration_in_which_surer_is_likelier() -> None:
     for model, even in (("opencv", 0.26), ("daimler", 1.52)):
-        found = replace(PeopleDetector(model=model).detect(picture()), scores=np.array([3.0, even, -1.0]))
+        found = replace(PeopleDetector(model=model).detect(PICTURE), scores=np.array([3.0, even, -1.0]))
         assert found.probabilities == pytest.approx([1.0, 0.5, 0.0], abs=0.05)
 
 
@@ -93,16 +88,13 @@ def test_the_people_are_drawn_into_a_copy() -> None:
 
 
 def test_drawing_without_opencv_names_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "cv2", None)
-    monkeypatch.delitem(__import__("sys").modules, "limo_hog.imaging.drawing", raising=False)
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    monkeypatch.delitem(sys.modules, "limo_hog.imaging.drawing", raising=False)
     with pytest.raises(limo_hog.MissingExtraError, match=r"pip install 'limo-hog\[cv\]'"):
-        some().draw(picture())
+        some().draw(PICTURE)
 
 
 def test_detecting_and_enlarging_need_no_opencv() -> None:
-    import subprocess
-    import sys
-
     code = (
         "import sys; sys.modules['cv2'] = None; import numpy as np, limo_hog;"
         "limo_hog.PeopleDetector().detect(np.zeros((200, 200, 3), np.uint8))"
@@ -135,11 +127,8 @@ def test_detections_say_how_many_people_there_are() -> None:
 
 def test_detections_become_json() -> None:
     found = replace(some()[:1], calibration=Calibration(1, 0))
-    assert json.loads(json.dumps(some()[:1].to_dict())) == {
-        "boxes": [[13, 13, 38, 100]],
-        "windows": [[0, 0, 64, 128]],
-        "scores": [2.0],
-    }
+    plain = {"boxes": [[13, 13, 38, 100]], "windows": [[0, 0, 64, 128]], "scores": [2.0]}
+    assert json.loads(json.dumps(some()[:1].to_dict())) == plain
     assert found.to_dict()["probabilities"] == found.probabilities.tolist()
 
 
@@ -147,7 +136,7 @@ def test_the_picture_is_saved_and_shown(tmp_path: Path, monkeypatch: pytest.Monk
     opened: list[str] = []
     monkeypatch.setattr("webbrowser.open", opened.append)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    image = picture().copy()
+    image = PICTURE.copy()
     found = PeopleDetector().detect(image)
     found.save(tmp_path / "people.png")
     found.show()
@@ -191,7 +180,7 @@ def test_detections_come_back_equal_from_other_libraries(
 
 
 def test_another_detectors_boxes_are_their_own_windows_best_first() -> None:
-    supervision = pytest.importorskip("supervision", reason="needs supervision")
+    supervision = pytest.importorskip("supervision")
     xyxy = np.array([[1, 2, 11, 22], [5, 6, 25, 46]], np.float32)
     found = Detections.from_supervision(supervision.Detections(xyxy, confidence=np.array([0.2, 0.9])))
     assert found.boxes.tolist() == [[5, 6, 20, 40], [1, 2, 10, 20]]

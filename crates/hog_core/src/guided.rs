@@ -1,9 +1,8 @@
 //! A faster search that may miss some hits: a few levels are searched whole, those between them around what was found.
 //!
-//! Kept for `PeopleDetector(search="guided")` and `limo-hog detect --search guided`. On ten photographs of 640 px (gray, one
-//! thread, AVX2, processor time, interleaved) it is 1.8 times as fast as the exact search and keeps all of 348 hits. The
-//! halving is kept, too: where every second level guides the one behind it, the search is 1.4 times as fast, where every
-//! fourth does 1.7, every sixteenth 1.75. What larger sets lose: docs/simd.md.
+//! Kept for `PeopleDetector(search="guided")` and `limo-hog detect --search guided`; docs/simd.md says what it gains and
+//! loses. The halving is kept, too: on ten photographs of 640 px (gray, one thread, processor time, interleaved) the search
+//! took 1.3 times as long where every second level guided the one behind it, with every fourth 1.06, every sixteenth 1.03.
 //!
 //! A person's hits lie on several neighbouring levels, at nearly the same place in the image. So where nothing came near to
 //! the threshold on the levels around it, a level has rarely a hit. The middle between two levels is searched around what

@@ -47,11 +47,9 @@ def _add_outputs(parser: argparse.ArgumentParser) -> None:
         "--format", choices=["jpg", "png"], help="of annotated pictures (JPEG where the picture is, else PNG)"
     )
     add_json(parser, "one JSON object a line")
-    parser.add_argument("--csv", type=output_file, metavar="FILE", help="write a table, a line a person")
-    parser.add_argument("--coco", type=output_file, metavar="FILE", help="write COCO's JSON of images and annotations")
-    parser.add_argument(
-        "--mot", type=output_file, metavar="FILE", help="write one film's people as MOTChallenge's lines (with --track)"
-    )
+    tables = {"csv": "a table, a line a person", "coco": "COCO's JSON of images and annotations"}
+    for name, what in (tables | {"mot": "one film's people as MOTChallenge's lines (with --track)"}).items():
+        parser.add_argument(f"--{name}", type=output_file, metavar="FILE", help=f"write {what}")
     parser.add_argument(
         "--track",
         nargs="?",

@@ -40,7 +40,6 @@ STREAM_TIMEOUT_S = 10
 #: How long is waited before a live source that broke off is opened again [s]: after the last of them it is given up.
 RETRY_AFTER_S = (1, 2, 4, 8, 16, 32)
 
-
 #: Number, uint8 (height, width, 3) BGR and time [s] of a frame.
 LiveFrame = tuple[int, NDArray[np.uint8], float]
 

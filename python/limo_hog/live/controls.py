@@ -36,13 +36,7 @@ class Parameter:
         return isinstance(self.value, int)
 
     def checked(self, value: Any) -> float:
-        """Return `value` as a number of this parameter's kind.
-
-        Raises
-        ------
-        ParameterError
-            It is no number within the bounds.
-        """
+        """Return `value` as a number of this parameter's kind; raises `ParameterError` if it is none within bounds."""
         # A bool is an int to Python, and an int may be too long for a float; NaN is within no bounds.
         number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if not number or not self.low <= value <= self.high or (self.whole and value != int(value)):
@@ -61,7 +55,6 @@ class Settable(Protocol):
 
     def set(self, name: str, value: Any) -> None:
         """Give a parameter a value; raises `ParameterError`."""
-        ...
 
 
 def apply(text: str, pace: Pace, controller: Settable | None) -> str | None:

@@ -69,13 +69,7 @@ class _Page:
     complaints: deque[str] = field(default_factory=lambda: deque(maxlen=10))
 
     async def send(self, message: dict[str, Any] | bytes) -> None:
-        """Send JSON or a picture; a page that does not take it in time is dropped.
-
-        Raises
-        ------
-        OSError
-            The connection is gone.
-        """
+        """Send JSON or a picture; a page that does not take it in time is dropped. Raises OSError if it is gone."""
         client = self.client
         sending = client.send_bytes(message) if isinstance(message, bytes) else client.send_str(json_text(message))
         try:
@@ -156,7 +150,7 @@ class Live(ABC, Generic[Moment]):
         try:
             asyncio.run_coroutine_threadsafe(self._start(), self._loop).result()
         except OSError as error:
-            self._stop_loop()
+            self.__exit__()
             raise ServeError(
                 f"the page cannot be served at {self._host}:{self._port}: {error.strerror or error}; "
                 "give --view another port"
@@ -165,9 +159,6 @@ class Live(ABC, Generic[Moment]):
 
     def __exit__(self, *_: object) -> None:
         asyncio.run_coroutine_threadsafe(self._stop(), self._loop).result()
-        self._stop_loop()
-
-    def _stop_loop(self) -> None:
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join()
         self._loop.close()
@@ -175,11 +166,11 @@ class Live(ABC, Generic[Moment]):
     async def _start(self) -> None:
         app = web.Application(middlewares=[self._guard])
         app.on_response_prepare.append(_add_headers)
-        # The styles are those of every page; the rest of `limo_hog.live` is the page of films.
-        own = [file for file in files(self._package).joinpath("page").iterdir() if file.name != "view.css"]
-        for file in (files("limo_hog.live").joinpath("page").joinpath("view.css"), *own):
-            where = "/" if file.name == "index.html" else f"/{file.name}"
-            app.router.add_get(where, partial(_file, file.read_bytes(), _KINDS[file.name.rpartition(".")[2]]))
+        # Styles and connection are those of every page; the rest of `limo_hog.live` is the page of films.
+        folders = [files(package).joinpath("page") for package in ("limo_hog.live", self._package)]
+        for name, file in {file.name: file for folder in folders for file in folder.iterdir()}.items():
+            where, kind = "/" if name == "index.html" else f"/{name}", _KINDS[name.rpartition(".")[2]]
+            app.router.add_get(where, partial(_file, file.read_bytes(), kind))
         app.router.add_get("/live", self._live)
         logger: Any = QuietLogger(logging.getLogger("limo_hog.live"), {})
         # Connections that ask nothing, or never finish asking, do not hold up the end.
@@ -187,12 +178,7 @@ class Live(ABC, Generic[Moment]):
             app, access_log=None, logger=logger, shutdown_timeout=0.1, lingering_time=0, keepalive_timeout=30
         )
         await self._runner.setup()
-        site = web.TCPSite(self._runner, self._host, self._port)
-        try:
-            await site.start()
-        except OSError:
-            await self._runner.cleanup()
-            raise
+        await web.TCPSite(self._runner, self._host, self._port).start()
         addresses = self._runner.addresses
         self._port = addresses[0][1]
         self._access = Access.at(self._host, [address[0] for address in addresses])
@@ -233,8 +219,7 @@ class Live(ABC, Generic[Moment]):
                 if message.type is WSMsgType.ERROR:
                     break  # longer than any control message, or against the protocol
                 text = message.data if message.type is WSMsgType.TEXT else ""
-                complaint = apply(text, self.pace, self._controls)
-                if complaint:
+                if complaint := apply(text, self.pace, self._controls):
                     page.complaints.append(complaint)
         finally:
             del self._pages[page]

@@ -19,7 +19,8 @@ from limo_hog.exceptions import LimoHogError
 
 #: One line: source, frame, width, height, boxes, windows, scores, probabilities, ids if tracked, ms, parameters.
 Result = dict[str, Any]
-#: What of a line has an entry for each person.
+#: What of a line is about the picture, and what has an entry for each person.
+_PICTURE = ("source", "frame", "width", "height")
 _EACH = ("boxes", "windows", "scores", "probabilities")
 #: What of a line is read back.
 _KINDS: dict[str, type] = {"source": str, "frame": int, "width": int, "height": int, "parameters": dict}
@@ -41,18 +42,9 @@ class Row:
     def result(self) -> Result:
         """Return it as plain values; a model without calibration has None for each probability."""
         people = self.people
-        return {
-            "source": self.source,
-            "frame": self.frame,
-            "width": self.width,
-            "height": self.height,
-            "boxes": people.boxes.tolist(),
-            "windows": people.windows.tolist(),
-            "scores": people.scores.tolist(),
-            "probabilities": people.probabilities.round(4).tolist() if people.calibration else [None] * len(people),
-            **({} if people.ids is None else {"ids": people.ids.tolist()}),
-            "ms": self.ms,
-        }
+        shares = people.probabilities.round(4).tolist() if people.calibration else [None] * len(people)
+        picture = {name: getattr(self, name) for name in _PICTURE}
+        return picture | people.to_dict() | {"probabilities": shares, "ms": self.ms}
 
 
 #: A function that writes a result, and the results of an earlier run (None if no file is kept).
@@ -169,9 +161,9 @@ def write_csv(path: Path, results: Iterable[Result]) -> None:
     results = list(results)
     known = ("id",) if any("ids" in result for result in results) else ()
     heads = (*BOX_COLUMNS, *WINDOW_COLUMNS, "score", "probability", *known)
-    table.writerow(("source", "frame", "width", "height", *heads))
+    table.writerow((*_PICTURE, *heads))
     for result in results:
-        about_picture = [result[name] for name in ("source", "frame", "width", "height")]
+        about_picture = [result[name] for name in _PICTURE]
         for box, window, score, probability, number in _people(result):
             table.writerow((*about_picture, *box, *window, score, probability, *([number] if known else ())))
     write_text(path, text.getvalue())

@@ -1,7 +1,6 @@
 // The page of a running episode: shows what the run sends, and sends back control messages.
 "use strict";
 
-const $ = (id) => document.getElementById(id);
 const KEPT_PICTURES = 400; // of the camera, for the timeline
 const KEPT = 6000; // control periods kept for the trails
 // Columns of a row; from PEOPLE on x and y of each person, in the scenario's order.
@@ -12,26 +11,12 @@ let now = null; // the newest state
 let past = null; // the row that the timeline shows; null for the newest
 let pictures = []; // camera pictures for the timeline: time and JPEG
 let history = []; // one row a control period
-let socket = null;
-let ended = false;
 let colours = {};
 let drawing = false;
-
-function connect() {
-  socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`);
-  socket.binaryType = "arraybuffer";
-  socket.onmessage = ({ data }) => (typeof data === "string" ? read(JSON.parse(data)) : show(data));
-  socket.onclose = () => {
-    if (ended) return;
-    notice("The run is over, or was stopped. What you see is the last it showed.");
-    setTimeout(connect, 2000);
-  };
-}
 
 function read(message) {
   if (message.scenario !== undefined) welcome(message);
   if (message.state) state(message.state, message.rows);
-  if (message.complaint) $("complaint").textContent = message.complaint;
   if (message.ended) end(message.ended);
 }
 
@@ -89,7 +74,7 @@ function show(data) {
   const start = kind === "w" ? bytes.indexOf(10) + 1 : 1;
   const picture =
     kind === "w" ? nodeWindow(new TextDecoder().decode(bytes.subarray(1, start - 1))) : $({ c: "camera", d: "depth" }[kind]);
-  const jpeg = new Blob([bytes.subarray(start)], { type: "image/jpeg" });
+  const jpeg = bytes.slice(start);
   if (kind === "c") {
     pictures.push([now.time, jpeg]);
     // Of a long run every other is kept, then every fourth, and so on.
@@ -97,12 +82,6 @@ function show(data) {
   }
   if (kind !== "c" || !past) putPicture(picture, jpeg);
   picture.dataset.count = Number(picture.dataset.count || 0) + 1;
-}
-
-function putPicture(picture, jpeg) {
-  const old = picture.src;
-  picture.src = URL.createObjectURL(jpeg);
-  if (old) URL.revokeObjectURL(old);
 }
 
 // Whom to follow: a button for each person in the picture, by number, or a click on them.
@@ -197,11 +176,6 @@ function end(card) {
   for (const control of document.querySelectorAll("header :is(button, select), form input")) control.disabled = true;
 }
 
-function notice(text) {
-  $("notice").textContent = text;
-  $("notice").hidden = !text;
-}
-
 const element = (kind, properties) => Object.assign(document.createElement(kind), properties);
 
 function put(id, value, digits, unit) {
@@ -217,7 +191,6 @@ const zone = (distance) => ZONES[scene.zones.filter((end) => distance > end).len
 
 // Controls
 
-const send = (message) => socket.readyState === WebSocket.OPEN && socket.send(JSON.stringify(message));
 const pause = () => send({ do: now && now.paused ? "resume" : "pause" });
 $("pause").onclick = pause;
 $("step").onclick = () => send({ do: "step" });
@@ -248,10 +221,7 @@ function parameters(all) {
     const label = element("label", { title: `${tooltip} From ${low} to ${high}${unit && ` ${unit}`}.` });
     label.append(element("span", { textContent: words }), input, element("small", { textContent: unit }));
     input.onfocus = () => ($("about").textContent = label.title);
-    input.onchange = () => {
-      $("complaint").textContent = "";
-      send({ set: name, value: input.valueAsNumber });
-    };
+    input.onchange = () => send({ set: name, value: input.valueAsNumber });
     $("fields").append(label);
   }
 }

@@ -22,6 +22,13 @@ def pictures(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty working directory."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
 def answer_to(capsys: pytest.CaptureFixture[str]) -> AnswerTo:
     """Run `limo-hog` with some words, and return its code and what it printed."""
 

@@ -71,11 +71,7 @@ def test_a_file_that_is_no_picture_is_named(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "told"),
-    [
-        ("", "the name of the picture is empty"),
-        ("a\0b.jpg", "is no file's name"),
-        ("\ud800.jpg", "is no file's name"),
-    ],
+    [("", "the name of the picture is empty"), ("a\0b.jpg", "is no file's name"), ("\ud800.jpg", "is no file's name")],
 )
 def test_a_name_that_no_file_can_have_is_refused(name: str, told: str) -> None:
     with pytest.raises(ImageError, match=told):

@@ -44,8 +44,7 @@ def test_the_whole_configuration_may_be_cyclone_dds_own() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "value"),
-    [(RANGE, "subnet"), (ONLY, "yes"), *(("ROS_DOMAIN_ID", value) for value in ("233", "x", "-1"))],
+    ("name", "value"), [(RANGE, "subnet"), (ONLY, "yes"), *(("ROS_DOMAIN_ID", value) for value in ("233", "x", "-1"))]
 )
 def test_a_value_that_ros_2_does_not_know_is_refused(name: str, value: str) -> None:
     with pytest.raises(BusError, match=f"{name} is {value!r}"):

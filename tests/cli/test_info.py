@@ -9,9 +9,7 @@ import pytest
 from tests.cli.material import AnswerTo
 
 
-def test_info_names_versions_hardware_and_the_line_that_installs_each_extra(
-    answer_to: AnswerTo, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_info_names_versions_hardware_and_extras(answer_to: AnswerTo, monkeypatch: pytest.MonkeyPatch) -> None:
     def lacking(name: str) -> str:
         if name in ("av", "limo-sim"):
             raise importlib.metadata.PackageNotFoundError(name)

@@ -1,4 +1,4 @@
-"""Folders that several tests of the command line read, and commands in this process."""
+"""Folders that several tests of the command line read."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.cli.material import PICTURE, Answer, AnswerTo
+from tests.cli.material import PICTURE
 
-from limo_hog.cli.main import main
 from limo_hog.imaging.writing import write_image
 
 
@@ -26,14 +25,3 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty working directory."""
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-@pytest.fixture
-def answer_to(capsys: pytest.CaptureFixture[str]) -> AnswerTo:
-    """Run `limo-hog` with some words, and return its code and what it printed."""
-
-    def answer(*words: object) -> Answer:
-        code = main([str(word) for word in words])
-        return Answer(code, *capsys.readouterr())
-
-    return answer

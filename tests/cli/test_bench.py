@@ -8,7 +8,7 @@ from typing import Any
 
 import cv2
 import pytest
-from tests.cli.material import AnswerTo
+from tests.answers import AnswerTo
 
 import limo_hog
 from limo_hog import detector

@@ -15,7 +15,8 @@ import cv2
 import numpy as np
 import pytest
 from pytest import MonkeyPatch
-from tests.cli.material import LIMO_HOG, OPENCVS, PICTURE, AnswerTo, film_of, lines_of
+from tests.answers import AnswerTo
+from tests.cli.material import LIMO_HOG, OPENCVS, PICTURE, film_of, lines_of
 
 import limo_hog
 from limo_hog.cli.main import main

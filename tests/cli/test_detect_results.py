@@ -13,7 +13,8 @@ from pathlib import Path
 
 import cv2
 import pytest
-from tests.cli.material import LIMO_HOG, AnswerTo, film_of, lines_of, on_a_full_disk
+from tests.answers import AnswerTo
+from tests.cli.material import LIMO_HOG, film_of, lines_of, on_a_full_disk
 
 from limo_hog.cli.main import main
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from rich.console import Console
-from tests.cli.material import AnswerTo
+from tests.answers import AnswerTo
 
 from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.sense.detectors import detector_named

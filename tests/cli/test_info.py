@@ -6,7 +6,7 @@ import importlib.metadata
 
 import cv2
 import pytest
-from tests.cli.material import AnswerTo
+from tests.answers import AnswerTo
 
 
 def test_info_names_versions_hardware_and_extras(answer_to: AnswerTo, monkeypatch: pytest.MonkeyPatch) -> None:

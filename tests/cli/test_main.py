@@ -8,7 +8,7 @@ from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
-from tests.cli.material import AnswerTo
+from tests.answers import AnswerTo
 
 from limo_hog.cli.main import ARENA, BUILT_IN, main
 

@@ -18,7 +18,8 @@ from unittest.mock import Mock
 import cv2
 import pytest
 from pytest import MonkeyPatch
-from tests.cli.material import LIMO_HOG, PICTURE, AnswerTo, film_of, lines_of
+from tests.answers import AnswerTo
+from tests.cli.material import LIMO_HOG, PICTURE, film_of, lines_of
 
 from limo_hog.atomic import alone, json_text, whole_file
 from limo_hog.cli.main import main

@@ -25,7 +25,8 @@ import cv2
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
-from tests.cli.material import LIMO_HOG, AnswerTo, frames_of, on_a_full_disk
+from tests.answers import AnswerTo
+from tests.cli.material import LIMO_HOG, frames_of, on_a_full_disk
 from tests.sim.view.stalled import stalled
 
 from limo_hog.cli.main import main

@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 import pytest
 from pytest import MonkeyPatch
-from tests.cli.material import LIMO_HOG, AnswerTo
+from tests.answers import AnswerTo
+from tests.cli.material import LIMO_HOG
 
 
 def test_a_wrong_option_is_answered_in_two_lines(answer_to: AnswerTo) -> None:

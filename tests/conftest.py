@@ -1,6 +1,7 @@
 """What every test begins with, whatever started the tests."""
 
 import signal
+from pathlib import Path
 
 import pytest
 from tests.answers import Answer, AnswerTo
@@ -10,6 +11,13 @@ from tests.answers import Answer, AnswerTo
 for _number, _handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
     if signal.getsignal(_number) is signal.SIG_IGN:
         signal.signal(_number, _handler)
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty working directory."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
 
 
 @pytest.fixture

@@ -18,10 +18,3 @@ def pictures(tmp_path: Path) -> Path:
     write_image(folder / "deep" / "b.png", np.ascontiguousarray(PICTURE[:, ::-1]))
     write_image(folder / "c.png", np.zeros((20, 20, 3), np.uint8))
     return folder
-
-
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty working directory."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path

@@ -1,6 +1,7 @@
 """What every test begins with, whatever started the tests."""
 
 import signal
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,16 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty working directory."""
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+@pytest.fixture
+def threads_put_back() -> Iterator[None]:
+    """The number of threads of searches is afterwards what it was."""
+    import limo_hog
+
+    before = limo_hog.get_num_threads()
+    yield
+    limo_hog.set_num_threads(before)
 
 
 @pytest.fixture

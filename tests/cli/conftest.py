@@ -1,4 +1,4 @@
-"""Folders that several tests of the command line read, and commands in this process."""
+"""Folders that several tests of the command line read."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.cli.material import PICTURE, Answer, AnswerTo
+from tests.cli.material import PICTURE
 
-from limo_hog.cli.main import main
 from limo_hog.imaging.writing import write_image
 
 
@@ -19,14 +18,3 @@ def pictures(tmp_path: Path) -> Path:
     write_image(folder / "deep" / "b.png", np.ascontiguousarray(PICTURE[:, ::-1]))
     write_image(folder / "c.png", np.zeros((20, 20, 3), np.uint8))
     return folder
-
-
-@pytest.fixture
-def answer_to(capsys: pytest.CaptureFixture[str]) -> AnswerTo:
-    """Run `limo-hog` with some words, and return its code and what it printed."""
-
-    def answer(*words: object) -> Answer:
-        code = main([str(word) for word in words])
-        return Answer(code, *capsys.readouterr())
-
-    return answer

@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import av
 import numpy as np
@@ -19,18 +18,6 @@ PICTURE = street(192, 256, 3)
 LIMO_HOG = Path(sys.executable).with_name("limo-hog")
 #: With these `detect` gives OpenCV's rectangles.
 OPENCVS = ("--model", "opencv", "--min-height", "none", "--nms", "group")
-
-
-class Answer(NamedTuple):
-    """How a command ended, and what it printed."""
-
-    code: int
-    out: str
-    err: str
-
-
-#: A command line, word by word.
-AnswerTo = Callable[..., Answer]
 
 
 def film_of(path: Path, frames: int = 12) -> None:

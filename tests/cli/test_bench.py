@@ -8,7 +8,7 @@ from typing import Any
 
 import cv2
 import pytest
-from tests.cli.material import AnswerTo
+from tests.answers import AnswerTo
 
 import limo_hog
 from limo_hog import detector
@@ -74,9 +74,7 @@ def test_calls_are_timed_in_turn_and_no_more_often_than_asked() -> None:
     assert all(0 <= timing.min <= timing.p50 for timing in timings)
 
 
-def test_a_guided_search_may_miss_what_the_exact_one_finds(
-    answer_to: AnswerTo, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_guided_search_may_miss_people(answer_to: AnswerTo, monkeypatch: pytest.MonkeyPatch) -> None:
     (row,) = rows_of(answer_to, *SMALL, "--search", "guided")
     assert (row["search"], row["rects_equal"]) == ("guided", True)
     assert row["ratio"] > 0

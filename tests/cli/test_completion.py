@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 
 import pytest
-from tests.cli.material import AnswerTo
+from tests.answers import AnswerTo
 
 from limo_hog.cli.completion import SHELLS
 from limo_hog.cli.main import ARENA, BUILT_IN

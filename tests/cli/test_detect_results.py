@@ -8,13 +8,13 @@ import os
 import signal
 import stat
 import subprocess
-import threading
 import time
 from pathlib import Path
 
 import cv2
 import pytest
-from tests.cli.material import LIMO_HOG, AnswerTo, film_of, lines_of, on_a_full_disk
+from tests.answers import AnswerTo
+from tests.cli.material import LIMO_HOG, film_of, lines_of, on_a_full_disk
 
 from limo_hog.cli.main import main
 
@@ -59,16 +59,13 @@ def test_copies_and_lines_that_are_there_are_not_made_again(pictures: Path, tmp_
     assert (out / "film.mp4").stat().st_mtime_ns == made[out / "film.mp4"]
 
 
-def test_results_go_through_a_pipe_which_keeps_nothing_to_go_on_from(
-    pictures: Path, tmp_path: Path, answer_to: AnswerTo
-) -> None:
-    pipe, came = tmp_path / "pipe", []
+def test_results_go_through_a_pipe_which_keeps_nothing(pictures: Path, tmp_path: Path, answer_to: AnswerTo) -> None:
+    pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
-    reader = threading.Thread(target=lambda: came.append(pipe.read_text()), daemon=True)
-    reader.start()
-    assert main(["detect", str(pictures), "--json", str(pipe)]) == 0
-    reader.join(10)
-    assert [Path(r["source"]).name for r in lines_of(came[0])] == ["a.png", "c.png", "b.png"]
+    with subprocess.Popen(["cat", pipe], stdout=subprocess.PIPE, text=True) as reader:
+        assert main(["detect", str(pictures), "--json", str(pipe)]) == 0
+        came = reader.communicate(timeout=10)[0]
+    assert [Path(r["source"]).name for r in lines_of(came)] == ["a.png", "c.png", "b.png"]
     assert stat.S_ISFIFO(pipe.stat().st_mode)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["in", "pipe"]
     code, _, err = answer_to("detect", pictures, "--json", pipe, "--resume")
@@ -83,9 +80,7 @@ def test_results_to_the_null_device_leave_it_a_device(pictures: Path, tmp_path: 
         assert stat.S_ISCHR(null.stat().st_mode)
 
 
-def test_the_files_of_an_earlier_run_are_replaced_only_when_asked(
-    pictures: Path, tmp_path: Path, answer_to: AnswerTo
-) -> None:
+def test_the_files_of_an_earlier_run_are_kept_unless_asked(pictures: Path, tmp_path: Path, answer_to: AnswerTo) -> None:
     for option, name, told in (("--json", "found.json", "found.json"), ("--out", "out", "a.png")):
         arguments = ("detect", pictures, option, tmp_path / name)
         assert answer_to(*arguments).code == 0
@@ -96,57 +91,48 @@ def test_the_files_of_an_earlier_run_are_replaced_only_when_asked(
         assert answer_to(*arguments, "--overwrite").code == 0
     assert len(lines_of((tmp_path / "found.json").read_text())) == 3
 
-
-def test_what_a_killed_run_left_is_not_lost_unasked(pictures: Path, tmp_path: Path, answer_to: AnswerTo) -> None:
-    (tmp_path / ".found.part.json").write_text("{}\n")
-    code, _, err = answer_to("detect", pictures, "--json", tmp_path / "found.json")
+    # What a killed run left is not lost unasked, either.
+    (tmp_path / ".killed.part.json").write_text("{}\n")
+    code, _, err = answer_to("detect", pictures, "--json", tmp_path / "killed.json")
     assert code == 2 and "--resume goes on from it" in err
 
 
-@pytest.mark.parametrize(
-    ("option", "told"),
-    [("--threshold 0.5", "threshold 0.5, now None"), ("--search guided", "search guided, now exact")],
-)
+@pytest.mark.parametrize(("option", "was", "now"), [("--threshold", "0.5", "None"), ("--search", "guided", "exact")])
 def test_resuming_with_other_parameters_is_refused(
-    option: str, told: str, pictures: Path, tmp_path: Path, answer_to: AnswerTo
+    option: str, was: str, now: str, pictures: Path, tmp_path: Path, answer_to: AnswerTo
 ) -> None:
     file = tmp_path / "found.json"
     arguments = ("detect", pictures, "--json", file)
-    assert answer_to(*arguments, *option.split()).code == 0
+    assert answer_to(*arguments, option, was).code == 0
     before = file.read_bytes()
     code, _, err = answer_to(*arguments, "--resume")
-    assert code == 1 and f"found.json was made with other parameters: {told}" in err
+    assert code == 1 and f"found.json was made with other parameters: {option[2:]} {was}, now {now}" in err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["found.json", "in"]
-    assert answer_to(*arguments, "--resume", *option.split()).code == 0
+    assert answer_to(*arguments, "--resume", option, was).code == 0
     assert file.read_bytes() == before
 
 
-#: Values of another kind than those of a line.
-WRONG: dict[str, tuple[object, ...]] = {
-    "boxes": (5, [5], [[1, 2, 3]], [["1", 2, 3, 4]]),
-    "scores": (["high"], []),
-    "source": ([],),
-    "frame": ("0",),
-    "width": (None,),
-    "parameters": (7,),
-}
+#: Names of a line, and values of another kind.
+WRONG: list[tuple[str, object]] = [
+    *(("boxes", value) for value in (5, [5], [[1, 2, 3]], [["1", 2, 3, 4]])),
+    *(("scores", ["high"]), ("scores", []), ("source", []), ("frame", "0"), ("width", None), ("parameters", 7)),
+]
 
 
-@pytest.mark.parametrize("change", [{name: value} for name, values in WRONG.items() for value in values])
 def test_a_line_with_a_value_of_another_kind_is_not_gone_on_from(
-    change: dict[str, object], pictures: Path, tmp_path: Path, answer_to: AnswerTo
+    pictures: Path, here: Path, answer_to: AnswerTo
 ) -> None:
-    file, table = tmp_path / "found.json", tmp_path / "found.csv"
-    arguments = ("detect", pictures / "a.png", "--json", file, "--csv", table)
+    arguments = ("detect", pictures / "a.png", "--json", "found.json", "--csv", "found.csv")
     assert answer_to(*arguments).code == 0
-    (line,) = lines_of(file.read_text())
-    kept = {"boxes": [[1, 2, 3, 4]], "windows": [[0, 0, 9, 9]], "scores": [0.5], "probabilities": [0.9]}
-    for damaged in (json.dumps(line | kept | change) + "\n", "my notes\n"):
+    file = here / "found.json"
+    whole = lines_of(file.read_text())[0] | {"boxes": [[1, 2, 3, 4]], "windows": [[0, 0, 9, 9]]}
+    whole |= {"scores": [0.5], "probabilities": [0.9]}
+    for damaged in ("my notes\n", *(json.dumps(whole | {name: value}) + "\n" for name, value in WRONG)):
         file.write_text(damaged)
         code, _, err = answer_to(*arguments, "--resume")
-        assert code == 1 and "found.json: not the JSON lines of an earlier run" in err
+        assert code == 1 and "found.json: not the JSON lines of an earlier run" in err, damaged
         assert file.read_text() == damaged
-    file.write_text(json.dumps(line | kept) + "\n")
+    file.write_text(json.dumps(whole) + "\n")
     assert answer_to(*arguments, "--resume").code == 0
 
 

@@ -6,12 +6,10 @@ import importlib.metadata
 
 import cv2
 import pytest
-from tests.cli.material import AnswerTo
+from tests.answers import AnswerTo
 
 
-def test_info_names_versions_hardware_and_the_line_that_installs_each_extra(
-    answer_to: AnswerTo, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_info_names_versions_hardware_and_extras(answer_to: AnswerTo, monkeypatch: pytest.MonkeyPatch) -> None:
     def lacking(name: str) -> str:
         if name in ("av", "limo-sim"):
             raise importlib.metadata.PackageNotFoundError(name)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
-from tests.cli.material import AnswerTo
+from tests.answers import AnswerTo
 
 from limo_hog.cli.main import ARENA, BUILT_IN, main
 
@@ -24,10 +25,7 @@ def test_the_package_runs_as_a_module() -> None:
 
 
 def test_too_little_memory_is_one_line(monkeypatch: pytest.MonkeyPatch, answer_to: AnswerTo) -> None:
-    def starve(_: object) -> int:
-        raise MemoryError("Unable to allocate 3 TiB")
-
-    monkeypatch.setattr("limo_hog.cli.info.run", starve)
+    monkeypatch.setattr("limo_hog.cli.info.run", Mock(side_effect=MemoryError("Unable to allocate 3 TiB")))
     assert answer_to("info") == (1, "", "limo-hog: out of memory: Unable to allocate 3 TiB\n")
 
 
@@ -39,20 +37,14 @@ def test_a_named_error_is_one_line_and_with_debug_a_traceback(answer_to: AnswerT
             main(typed)
 
 
-def modules_of(*words: object) -> set[str]:
-    """Run a command in a process of its own; return its lines and the modules it imported."""
+@pytest.mark.parametrize(("typed", "imported"), [("--help", set()), ("detect --json - broken.jpg", {"cv2"})])
+def test_a_command_imports_the_libraries_that_it_needs(typed: str, imported: set[str], here: Path) -> None:
+    (here / "broken.jpg").write_bytes(b"no picture")
     code = "import sys; from limo_hog.cli.main import main; main(); print(*sys.modules, sep='\\n')"
-    command = [sys.executable, "-c", code, *map(str, words)]
-    return set(subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines())
+    done = subprocess.run([sys.executable, "-c", code, *typed.split()], check=True, capture_output=True, text=True)
+    assert {"cv2", "rich", "limo_sim", "aiohttp"} & {*done.stdout.splitlines()} == imported
 
 
-def test_help_imports_no_library_and_rich_is_for_a_terminals_progress(tmp_path: Path) -> None:
-    assert modules_of("--help").isdisjoint({"cv2", "rich", "av", "limo_sim", "aiohttp"})
-    (tmp_path / "broken.jpg").write_bytes(b"no picture")
-    assert modules_of("detect", "--json", "-", tmp_path / "broken.jpg") & {"cv2", "rich"} == {"cv2"}
-
-
-def test_wrong_words_are_answered_with_the_usage_and_a_name_that_is_no_file_too(answer_to: AnswerTo) -> None:
-    for typed, told in ((["nonsense"], "nonsense"), (["detect", "a.png", "--json", ""], "'' is no file")):
-        code, _, err = answer_to(*typed)
-        assert code == 2 and err.startswith("usage: limo-hog") and told in err
+def test_an_empty_name_of_a_file_is_answered_with_the_usage(answer_to: AnswerTo) -> None:
+    code, _, err = answer_to("detect", "a.png", "--json", "")
+    assert code == 2 and err.startswith("usage: limo-hog") and "'' is no file" in err

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import signal
-import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -12,15 +11,11 @@ from limo_hog import signals
 from limo_hog.signals import Stopped, held, stopping
 
 
-def _send(number: int) -> None:
-    os.kill(os.getpid(), number)
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_stops_a_command_and_handlers_are_put_back(number: signal.Signals) -> None:
     before = signal.getsignal(number)
     with pytest.raises(Stopped) as stopped, stopping():
-        _send(number)
+        signal.raise_signal(number)
     assert stopped.value.signal == number
     assert signal.getsignal(number) is before
 
@@ -29,7 +24,7 @@ def test_a_write_is_finished_before_a_signal_stops_the_command() -> None:
     done = []
     with pytest.raises(Stopped), stopping():
         with held(), held():
-            _send(signal.SIGTERM)
+            signal.raise_signal(signal.SIGTERM)
             done.append("written")
         done.append("not reached")
     assert done == ["written"]
@@ -39,7 +34,7 @@ def test_a_signal_that_a_library_swallows_stops_the_command_at_the_next_write() 
     done = []
     with pytest.raises(Stopped), stopping():
         try:
-            _send(signal.SIGTERM)
+            signal.raise_signal(signal.SIGTERM)
         except KeyboardInterrupt:
             done.append("swallowed")
         with held():
@@ -52,12 +47,12 @@ def test_the_signals_of_one_closing_terminal_do_not_interrupt_the_closing(monkey
     closed = []
     with pytest.raises(Stopped), stopping():
         try:
-            _send(signal.SIGHUP)
+            signal.raise_signal(signal.SIGHUP)
         finally:
-            _send(signal.SIGTERM)
+            signal.raise_signal(signal.SIGTERM)
             closed.append("whole")
             monkeypatch.setattr(signals, "IMPATIENT_S", 0.0)
-            _send(signal.SIGTERM)
+            signal.raise_signal(signal.SIGTERM)
             closed.append("not reached")
     assert closed == ["whole"]
 
@@ -66,19 +61,15 @@ def test_an_ignored_signal_stays_ignored() -> None:
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
         with stopping():
-            _send(signal.SIGHUP)
+            signal.raise_signal(signal.SIGHUP)
     finally:
         signal.signal(signal.SIGHUP, before)
 
 
 def test_a_thread_may_run_a_command() -> None:
-    done = []
-
-    def run() -> None:
+    def run() -> str:
         with stopping(), held():
-            done.append("run")
+            return "run"
 
-    thread = threading.Thread(target=run)
-    thread.start()
-    thread.join()
-    assert done == ["run"]
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(run).result() == "run"

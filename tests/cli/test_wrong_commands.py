@@ -11,7 +11,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from tests.cli.material import LIMO_HOG, AnswerTo
+from pytest import MonkeyPatch
+from tests.answers import AnswerTo
+from tests.cli.material import LIMO_HOG
 
 
 def test_a_wrong_option_is_answered_in_two_lines(answer_to: AnswerTo) -> None:
@@ -21,14 +23,11 @@ def test_a_wrong_option_is_answered_in_two_lines(answer_to: AnswerTo) -> None:
 
 
 @pytest.mark.parametrize("command", ["run", "score", "workshop"])
-def test_help_breaks_no_address(command: str, answer_to: AnswerTo, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_help_breaks_no_address(command: str, answer_to: AnswerTo, monkeypatch: MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     address = r"https://github\.com/limo-hog/limo-hog/blob/main/docs/\S+\.md$"
     assert re.search(address, answer_to(command, "--help").out, re.MULTILINE)
-
-
-def test_the_arena_lists_no_option_that_it_refuses(answer_to: AnswerTo) -> None:
-    assert "--plot" not in answer_to("arena", "--help").out
+    assert "--plot" not in answer_to("arena", "--help").out  # which refuses it
 
 
 #: Wrong arguments, which end with 2: what is typed, and a part of the last line of the answer.
@@ -84,17 +83,11 @@ WRONG_ARGUMENTS = [
     ("score --suite v1 --scenario empty", "not allowed with"),
     ("score --suite v1 --seconds 60", "a run of this suite takes 40 s"),
     ("score --controller approach --against ppo", "--against ppo: is none of the controllers"),
-    (
-        "score --controller zigzag",
-        "'zigzag' is no controller; wanted is one of approach, proxemic, tracking, pursuit, ppo",
-    ),
+    ("score --controller zigzag", "is no controller; wanted is one of approach, proxemic, tracking, pursuit, ppo"),
     ("score --scenario here/same.toml there/same.toml", "there/same.toml: is called 'same', as here/same.toml is"),
     ("score --scenario named.toml empty", "empty: is called 'empty', as named.toml is; give it another name"),
     ("arena", "give --ros2, --view, --video or --record"),
-    (
-        "arena --video a.mp4 --plot a.png --seconds 0.2",
-        "--plot a.png: an arena has no run to draw; use it with follow or run",
-    ),
+    ("arena --video a.mp4 --plot a.png --seconds 0.2", "a.png: an arena has no run to draw; use it with follow or run"),
     ("run", "the following arguments are required: NODE.py"),
     ("workshop", "the following arguments are required: new|check|solution"),
     ("workshop check node.py --hint -1", "'-1' is no count; wanted is a whole number from 1 on"),
@@ -131,18 +124,15 @@ IMPOSSIBLE = [
 
 
 @pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A working directory with a picture, a node, a text and a folder."""
-    monkeypatch.chdir(tmp_path)
+def folder(here: Path) -> None:
+    """A working directory with two pictures, some texts and a folder."""
     cv2.imwrite("a.jpg", np.zeros((200, 200, 3), np.uint8))
     cv2.imwrite("tiny.png", np.zeros((60, 200, 3), np.uint8))
-    Path("there.txt").write_text("text")
-    Path("node.py").write_text("")
-    Path("folder").mkdir()
-    for place in ("here", "there"):
+    for place in ("folder", "here", "there"):
         Path(place).mkdir()
-        Path(place, "same.toml").write_text("")
-    Path("named.toml").write_text("name = 'empty'")
+    texts = {"there.txt": "text", "node.py": "", "named.toml": "name = 'empty'"}
+    for name, text in (texts | dict.fromkeys(("here/same.toml", "there/same.toml"), "")).items():
+        Path(name).write_text(text)
 
 
 @pytest.mark.parametrize(("typed", "told"), WRONG_ARGUMENTS)
@@ -164,15 +154,12 @@ def test_what_cannot_be_done_is_told_by_one_line_and_1(typed: str, told: str, an
     assert line.startswith("limo-hog: ") and told in line and len(line) < 400
 
 
+#: What needs OpenCV, and what Cyclone DDS.
+OPENCVS = "detect a.jpg|bench --image a.jpg|follow|arena --view|run node.py|workshop check node.py|score --seeds 1"
+NETWORKED = "follow --ros2|arena --ros2|topic list"
 #: Libraries that are not installed, what is typed then, and the end of the only line of the answer.
 MISSING = [
-    ("cv2", "detect a.jpg", "needs OpenCV: pip install 'limo-hog[cv]'"),
-    ("cv2", "bench --image a.jpg", "needs OpenCV: pip install 'limo-hog[cv]'"),
-    ("cv2", "follow", "needs OpenCV: pip install 'limo-hog[cv]'"),
-    ("cv2", "arena --view", "needs OpenCV: pip install 'limo-hog[cv]'"),
-    ("cv2", "run node.py", "needs OpenCV: pip install 'limo-hog[cv]'"),
-    ("cv2", "workshop check node.py", "needs OpenCV: pip install 'limo-hog[cv]'"),
-    ("cv2", "score --seeds 1", "needs OpenCV: pip install 'limo-hog[cv]'"),
+    *(("cv2", typed, "needs OpenCV: pip install 'limo-hog[cv]'") for typed in OPENCVS.split("|")),
     ("cv2", "replay a.mcap --detector cv2", "needs OpenCV: pip install 'limo-hog[cv]'"),
     ("av", "follow --video a.mp4", "writing H.264 video needs PyAV: pip install 'limo-hog[video]'"),
     ("matplotlib", "follow --plot a.png", "--plot needs matplotlib: pip install 'limo-hog[plot]'"),
@@ -181,9 +168,7 @@ MISSING = [
     ("rosbags", "run node.py", "limo-hog run needs rosbags: pip install 'limo-hog[record]'"),
     ("rosbags", "workshop check node.py", "limo-hog workshop needs rosbags: pip install 'limo-hog[record]'"),
     ("rosbags", "replay a.mcap", "pip install 'limo-hog[record]'"),
-    ("cyclonedds", "follow --ros2", "ROS 2 over the network needs Cyclone DDS: pip install 'limo-hog[ros2]'"),
-    ("cyclonedds", "arena --ros2", "ROS 2 over the network needs Cyclone DDS: pip install 'limo-hog[ros2]'"),
-    ("cyclonedds", "topic list", "ROS 2 over the network needs Cyclone DDS: pip install 'limo-hog[ros2]'"),
+    *(("cyclonedds", typed, "needs Cyclone DDS: pip install 'limo-hog[ros2]'") for typed in NETWORKED.split("|")),
     ("shtab", "completion bash", "limo-hog completion needs shtab: pip install 'limo-hog[completion]'"),
     ("aiohttp", "follow --view", "the live page needs aiohttp: pip install 'limo-hog[view]'"),
 ]
@@ -210,12 +195,10 @@ def test_an_arena_that_is_only_filmed_needs_no_ros(library: str) -> None:
     assert Path("a.mp4").stat().st_size > 1000
 
 
-@pytest.mark.parametrize("typed", ["follow --detector cv2", "score --detector cv2"])
-def test_opencvs_detector_is_refused_at_once_where_opencv_has_none(
-    typed: str, monkeypatch: pytest.MonkeyPatch, answer_to: AnswerTo
-) -> None:
+@pytest.mark.parametrize("command", ["follow", "score"])
+def test_a_detector_that_opencv_lacks_is_refused(command: str, monkeypatch: MonkeyPatch, answer_to: AnswerTo) -> None:
     monkeypatch.delattr(cv2, "HOGDescriptor")
-    code, _, err = answer_to(*typed.split())
+    code, _, err = answer_to(command, "--detector", "cv2")
     assert code == 1 and err.endswith("has no HOGDescriptor: use the detector hog, or OpenCV 4\n")
 
 

@@ -14,6 +14,7 @@ import limo_hog
 from limo_hog import HOGDescriptor, visualize
 
 GEOMETRY = ((48, 96), (16, 16), (8, 8), (8, 8), 9)
+IMAGE = np.random.default_rng(1).integers(0, 256, (200, 100), dtype=np.uint8)
 
 
 def people() -> Any:
@@ -24,6 +25,12 @@ def people() -> Any:
 
 def noise(*shape: int) -> np.ndarray[Any, np.dtype[np.uint8]]:
     return np.random.default_rng(1).integers(0, 256, shape, dtype=np.uint8)
+
+
+def same_people(one: Any, other: Any) -> None:
+    assert len(one[0]) > 0
+    for first, second in zip(one, other, strict=True):
+        np.testing.assert_array_equal(first, second)
 
 
 in_every_way = pytest.mark.parametrize(
@@ -77,40 +84,23 @@ def test_attributes_are_read_only_and_the_detector_is_a_copy() -> None:
 
 def test_none_stands_for_every_default() -> None:
     assert repr(HOGDescriptor(*GEOMETRY, *[None] * 7)) == repr(HOGDescriptor(*GEOMETRY))
-    image = noise(200, 120)
-    for one, other in zip(
-        people().detectMultiScale(image, None, None, None, None, None), people().detectMultiScale(image), strict=True
-    ):
-        np.testing.assert_array_equal(one, other)
+    same_people(people().detectMultiScale(IMAGE, -3, *[None] * 4), people().detectMultiScale(IMAGE, -3))
+    # `finalThreshold` is the old name of `groupThreshold`.
+    new, old = ({"groupThreshold": 0}, {"finalThreshold": 0})
+    same_people(people().detectMultiScale(IMAGE, -3, **new), people().detectMultiScale(IMAGE, -3, **old))
 
 
 def test_a_flag_is_a_truth_value_or_an_integer_as_in_opencv() -> None:
-    for value in (True, np.bool_(True), 1, 2, np.int64(1)):
-        given: Any = value
-        assert HOGDescriptor(*GEOMETRY, _gammaCorrection=given).gammaCorrection
-    zero: Any = 0
-    assert not HOGDescriptor(*GEOMETRY, _gammaCorrection=zero).gammaCorrection
+    for value in (True, np.bool_(True), 1, 2, np.int64(1), 0):
+        assert untyped.HOGDescriptor(*GEOMETRY, _gammaCorrection=value).gammaCorrection == bool(value)
 
 
 def test_a_model_file_that_is_not_there_is_a_hog_error_and_an_os_error(tmp_path: Path) -> None:
     missing = tmp_path / "none.yml"
-    for load in (HOGDescriptor, HOGDescriptor().load):
-        with pytest.raises(limo_hog.HogError, match=r"none\.yml") as caught:
-            load(missing)
-        assert isinstance(caught.value, FileNotFoundError)
-    with pytest.raises(limo_hog.HogError) as caught:
-        HOGDescriptor(tmp_path)
-    assert isinstance(caught.value, OSError)
-
-
-def test_final_threshold_is_the_old_name_of_group_threshold() -> None:
-    image = noise(200, 120)
-    for new, old in zip(
-        people().detectMultiScale(image, -3, groupThreshold=0),
-        people().detectMultiScale(image, -3, finalThreshold=0),
-        strict=True,
-    ):
-        np.testing.assert_array_equal(new, old)
+    for load, path in ((HOGDescriptor, missing), (HOGDescriptor().load, missing), (HOGDescriptor, tmp_path)):
+        with pytest.raises(limo_hog.HogError, match=path.name) as caught:
+            load(path)
+        assert isinstance(caught.value, FileNotFoundError if path is missing else OSError)
 
 
 @pytest.mark.parametrize("shape", [(3780,), (3781,), (3781, 1), (1, 3781)])
@@ -126,14 +116,12 @@ def test_coefficients_come_as_any_row_of_numbers(shape: tuple[int, ...], kind: A
 
 #: Without its types, so that they can be wrong.
 untyped: Any = limo_hog
-IMAGE = noise(200, 100)
 
 WRONG: list[tuple[Any, type[Exception], str]] = [
     (lambda: untyped.HOGDescriptor((64, 128)), TypeError, "_blockSize, _blockStride, _cellSize, _nbins"),
     (lambda: untyped.HOGDescriptor((64.0, 128), *GEOMETRY[1:]), TypeError, "_winSize is"),
     (lambda: untyped.HOGDescriptor((64, 128, 3), *GEOMETRY[1:]), TypeError, "_winSize is"),
     (lambda: untyped.HOGDescriptor(*GEOMETRY[:4], 9.5), TypeError, "_nbins is 9.5"),
-    (lambda: untyped.HOGDescriptor(*GEOMETRY[:4], 0).getDescriptorSize(), ValueError, "nbins is 0"),
     (lambda: untyped.HOGDescriptor((2**40, 8), *GEOMETRY[1:]), ValueError, "_winSize is"),
     (lambda: untyped.HOGDescriptor(*GEOMETRY[:4], 10**5000), ValueError, "_nbins is int of thousands of digits"),
     (lambda: people().detectMultiScale(IMAGE, scale=10**400), ValueError, "scale is 1000"),
@@ -142,7 +130,6 @@ WRONG: list[tuple[Any, type[Exception], str]] = [
     (lambda: people().detect(IMAGE, "1"), TypeError, "hitThreshold is '1'"),
     (lambda: people().detectMultiScale(IMAGE, scale="1"), TypeError, "scale is '1'"),
     (lambda: people().detect(IMAGE, 0, (8,)), TypeError, r"winStride is \(8,\)"),
-    (lambda: people().detect(IMAGE, 0, (0, 8)), ValueError, r"winStride is \(0, 8\)"),
     (lambda: people().compute(IMAGE, locations=[(0.5, 1)]), TypeError, "locations has shape"),
     (lambda: people().compute(IMAGE, locations=[(0, 1), (2,)]), TypeError, "locations has shape"),
     (lambda: people().setSVMDetector(["a"]), TypeError, "real numbers"),
@@ -179,8 +166,7 @@ WRONG: list[tuple[Any, type[Exception], str]] = [
 def test_a_wrong_argument_is_named_with_what_came(call: Any, kind: type[Exception], told: str) -> None:
     with pytest.raises(limo_hog.HogError, match=told) as caught:
         call()
-    assert isinstance(caught.value, kind)
-    assert len(str(caught.value)) < 300
+    assert isinstance(caught.value, kind) and len(str(caught.value)) < 300
 
 
 def test_arrays_given_to_compute_gradient_are_filled() -> None:
@@ -210,5 +196,4 @@ def test_a_picture_of_a_detector_tells_for_from_against() -> None:
         assert picture[..., strong].sum() > picture[..., weak].sum()
     assert visualize(hog, np.zeros(3780)).sum() == 0
     # None stands for the default, as for every other argument.
-    unset: Any = None
-    np.testing.assert_array_equal(visualize(hog, np.ones(3780), zoom=unset), visualize(hog, np.ones(3780)))
+    np.testing.assert_array_equal(untyped.visualize(hog, np.ones(3780), zoom=None), visualize(hog, np.ones(3780)))

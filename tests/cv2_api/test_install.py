@@ -60,26 +60,21 @@ def test_replace_puts_every_name_in_the_place_of_opencvs() -> None:
         vars(cv2).update(before)
 
 
-def people() -> HOGDescriptor:
-    hog = HOGDescriptor()
-    hog.setSVMDetector(hog.getDefaultPeopleDetector())
-    return hog
+HOG = HOGDescriptor()
+HOG.setSVMDetector(HOG.getDefaultPeopleDetector())
+WRONG = {
+    "no image": lambda: HOG.detectMultiScale(None),  # type: ignore[arg-type]
+    "floats": lambda: HOG.detectMultiScale(np.zeros((200, 100), np.float32)),
+    "stride": lambda: HOG.detect(np.zeros((200, 100), np.uint8), winStride=(0, 8)),
+    "length": lambda: HOG.setSVMDetector(np.ones(7)),
+    "geometry": lambda: HOGDescriptor((60, 128), (16, 16), (8, 8), (8, 8), 9).getDescriptorSize(),
+    "no file": lambda: HOGDescriptor("none.yml"),
+    "no model": lambda: HOGDescriptor(str(Path(__file__))),
+    "rectangles": lambda: limo_hog.groupRectangles([[0, 0, 1]], 1),
+}
 
 
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        lambda: people().detectMultiScale(None),  # type: ignore[arg-type]
-        lambda: people().detectMultiScale(np.zeros((200, 100), np.float32)),
-        lambda: people().detect(np.zeros((200, 100), np.uint8), winStride=(0, 8)),
-        lambda: people().setSVMDetector(np.ones(7)),
-        lambda: HOGDescriptor((60, 128), (16, 16), (8, 8), (8, 8), 9).getDescriptorSize(),
-        lambda: HOGDescriptor("none.yml"),
-        lambda: HOGDescriptor(str(Path(__file__))),
-        lambda: limo_hog.groupRectangles([[0, 0, 1]], 1),
-    ],
-    ids=["no image", "floats", "stride", "length", "geometry", "no file", "no model", "rectangles"],
-)
+@pytest.mark.parametrize("wrong", WRONG.values(), ids=WRONG)
 def test_once_installed_errors_are_caught_as_those_of_opencv(wrong: Any) -> None:
     limo_hog.install_into_cv2()
     with pytest.raises(cv2.error) as caught:

@@ -47,11 +47,8 @@ def saved_svm(path: Path, kind: int, negative: int) -> tuple[Any, Any]:
     features = np.stack([hog.compute(cv2.imread(str(name))) for name in paths])
     labels = np.array([1 if name.parent.name == "people" else negative for name in paths])
     svm = cv2.ml.SVM_create()
-    svm.setType(kind)
-    svm.setKernel(cv2.ml.SVM_LINEAR)
-    svm.setC(0.01)
-    svm.setP(0.1)
-    svm.setNu(0.2)
+    for name, value in {"Type": kind, "Kernel": cv2.ml.SVM_LINEAR, "C": 0.01, "P": 0.1, "Nu": 0.2}.items():
+        getattr(svm, f"set{name}")(value)
     if kind == cv2.ml.SVM_ONE_CLASS:
         features, labels = features[labels == 1], labels[labels == 1]
     regression = kind in (cv2.ml.SVM_EPS_SVR, cv2.ml.SVM_NU_SVR)
@@ -69,15 +66,11 @@ def run(page: str) -> dict[str, Any]:
 
 
 def test_the_readme_finds_people(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    names = run("README.md")
-    assert capsys.readouterr().out.count("a person at") >= 2
-    assert len(names["boxes"]) >= 2
+    assert len(run("README.md")["boxes"]) >= 2 and capsys.readouterr().out.count("a person at") >= 2
 
 
 def test_the_arenas_readme_follows_a_person(capsys: pytest.CaptureFixture[str]) -> None:
-    episode = run("sim/README.md")["episode"]
-    assert episode.seconds == 20
-    assert "ScoreCard(" in capsys.readouterr().out
+    assert run("sim/README.md")["episode"].seconds == 20 and "ScoreCard(" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -29,8 +29,8 @@ def test_every_crop_has_the_descriptor_that_compute_gives_it(size: tuple[int, in
     wanted = np.stack([hog.compute(crop) for crop in crops])
     for count in (1, 2, 3, 35):
         found = limo_hog.describe(crops[:count])
-        assert found.shape == (count, wanted.shape[1]) and found.dtype == np.float32
-        assert np.abs(found - wanted[:count]).max() < 1e-6
+        assert found.dtype == np.float32
+        np.testing.assert_allclose(found, wanted[:count], rtol=0, atol=1e-6)
 
 
 def test_crops_of_another_memory_layout_are_described_alike() -> None:
@@ -39,10 +39,7 @@ def test_crops_of_another_memory_layout_are_described_alike() -> None:
     assert np.array_equal(limo_hog.describe(np.asfortranarray(crops)), wanted)
     assert np.array_equal(limo_hog.describe(crops.repeat(2, axis=2)[:, :, ::2]), wanted)
     assert np.array_equal(limo_hog.describe(crops[..., :1]), limo_hog.describe(crops[..., 0]))
-
-
-def test_no_crops_have_no_descriptors() -> None:
-    assert limo_hog.describe(np.empty((0, 128, 64, 3), np.uint8)).shape == (0, 3780)
+    assert limo_hog.describe(crops[:0]).shape == (0, 3780)
 
 
 @pytest.mark.parametrize(

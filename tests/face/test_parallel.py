@@ -23,7 +23,7 @@ def test_results_come_in_the_order_of_their_items_whatever_each_takes() -> None:
         return item * item
 
     assert list(in_order(work, range(100), 4)) == [item * item for item in range(100)]
-    assert list(in_order(work, iter(()), 4)) == []
+    assert list(in_order(work, (), 4)) == []
 
 
 @pytest.mark.parametrize("threads", [1, 3])
@@ -60,12 +60,12 @@ def test_a_caller_who_stops_begins_nothing_more_and_leaves_no_thread() -> None:
         time.sleep(0.05)
         return item
 
-    before = set(threading.enumerate())
+    before = {*threading.enumerate()}
     results = in_order(work, range(1000), 2)
     next(results)
     results.close()  # type: ignore[attr-defined]
     assert len(begun) <= 6
-    assert not [thread for thread in threading.enumerate() if thread not in before and "limo-hog" in thread.name]
+    assert not [thread for thread in {*threading.enumerate()} - before if "limo-hog" in thread.name]
 
 
 def test_threads_that_cannot_be_had_are_done_without(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -85,13 +85,7 @@ def test_threads_that_cannot_be_had_are_done_without(monkeypatch: pytest.MonkeyP
     assert list(in_order(abs, range(50), 8)) == list(range(50)) and len(started) == 2
 
 
-def test_a_detector_uses_no_more_threads_than_there_are_cores() -> None:
-    before = limo_hog.get_num_threads()
+def test_a_detector_uses_no_more_threads_than_there_are_cores(threads_put_back: None) -> None:
     limo_hog.set_num_threads(10**6)
-    try:
-        most = 0
-        for _ in PeopleDetector(min_height=None).detect_many([np.zeros((140, 80), np.uint8)] * 300):
-            most = max(most, sum(thread.name == "limo-hog" for thread in threading.enumerate()))
-        assert most <= cores()
-    finally:
-        limo_hog.set_num_threads(before)
+    for _ in PeopleDetector(min_height=None).detect_many([np.zeros((140, 80), np.uint8)] * 300):
+        assert sum(thread.name == "limo-hog" for thread in threading.enumerate()) <= cores()

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 import limo_hog
 from limo_hog import PeopleDetector, _core, models
 from limo_hog.cli.support.scene import street
-from limo_hog.models import PERSON_BOX, SecondLook, load_model
+from limo_hog.models import PERSON_BOX, Model, SecondLook, load_model
 
 PHOTOGRAPHS = Path(__file__).parents[3] / "shared" / "data"
 WEIGHTS = Path(models.__file__).parent / "weights" / "second_look.f16"
@@ -52,28 +52,23 @@ def plain_answer(look: SecondLook, crop: Numbers) -> Numbers:
         taken, weights = np.split(weights, [int(np.prod(shape))])
         return taken.reshape(shape)
 
-    x, before = crop[:, :, None], 1
+    x = crop[:, :, None]
     for side, channels in zip((5, 3, 3), look.channels, strict=True):
-        kernel, bias = take(side, side, before, channels), take(channels)
-        padded = np.pad(x, ((side // 2, side), (side // 2, side), (0, 0)))
-        rows, columns = x.shape[0] // 2, x.shape[1] // 2
-        shifted = [
-            padded[dy : dy + 2 * rows : 2, dx : dx + 2 * columns : 2] @ kernel[dy, dx]
-            for dy in range(side)
-            for dx in range(side)
-        ]
-        x, before = np.maximum(sum(shifted, bias), 0), channels
+        kernel, bias = take(side, side, x.shape[2], channels), take(channels)
+        padded = np.pad(x, ((side // 2, side // 2), (side // 2, side // 2), (0, 0)))
+        around = np.lib.stride_tricks.sliding_window_view(padded, (side, side), (0, 1))[::2, ::2]
+        x = np.maximum(np.einsum("yxcij,ijcd->yxd", around, kernel) + bias, 0)
     hidden = np.maximum(x.ravel() @ take(x.size, look.hidden) + take(look.hidden), 0)
     answer = hidden @ take(look.hidden, 5) + take(5)
     assert not len(weights)
     return np.asarray(answer)
 
 
-def always(logit: float, right: float, down: float, wider: float, higher: float) -> SecondLook:
-    """A network with this answer to every window."""
+def always(logit: float, right: float, down: float, wider: float, higher: float) -> Model:
+    """Our model with a network that has this answer to every window."""
     weights = np.zeros(len(network().weights) // 2, "<f2")
     weights[-5:] = logit, right, down, np.log(wider), np.log(higher)
-    return network()._replace(weights=weights.tobytes())
+    return replace(load_model("limo"), second_look=network()._replace(weights=weights.tobytes()))
 
 
 def test_the_network_answers_what_plain_numpy_answers() -> None:
@@ -85,23 +80,20 @@ def test_the_network_answers_what_plain_numpy_answers() -> None:
 
 def test_a_score_is_the_margin_and_a_share_of_the_networks_logit() -> None:
     alone = PeopleDetector(threshold=-1, scale=1.1, second_look=False).detect(picture())
-    model = replace(load_model("limo"), second_look=always(2, 0, 0, 1, 1))
-    found = PeopleDetector(model=model, threshold=-9).detect(picture())
+    found = PeopleDetector(model=always(2, 0, 0, 1, 1), threshold=-9).detect(picture())
     np.testing.assert_allclose(found.scores, (alone.scores + 2 * network().share)[:50], atol=1e-6)
     assert len(found) > 5 and found.calibration == network().calibration
 
 
 def test_the_network_moves_and_stretches_the_boxes() -> None:
-    def best(*answer: float) -> Numbers:
-        model = replace(load_model("limo"), second_look=always(9, *answer))
-        return np.asarray(PeopleDetector(model=model).detect(picture()).windows[0], np.float64)
-
-    x, y, w, h = best(0, 0, 1, 1)
-    moved = PERSON_BOX.inside(best(0.1, -0.05, 1.2, 0.9)[None])[0]
-    (px, py, pw, ph), (to_x, to_y, to_w, to_h) = PERSON_BOX.inside(np.array([[x, y, w, h]]))[0], moved
-    np.testing.assert_allclose([to_w, to_h], [1.2 * pw, 0.9 * ph], atol=1)
-    np.testing.assert_allclose(to_x + to_w / 2, px + pw / 2 + 0.1 * w, atol=1.5)
-    np.testing.assert_allclose(to_y + to_h / 2, py + ph / 2 - 0.05 * h, atol=1.5)
+    before, after = (
+        PeopleDetector(model=always(9, *answer)).detect(picture()).windows[:1].astype(float)
+        for answer in ((0, 0, 1, 1), (0.1, -0.05, 1.2, 0.9))
+    )
+    (x, y, w, h), (to_x, to_y, to_w, to_h) = (PERSON_BOX.inside(one)[0] for one in (before, after))
+    np.testing.assert_allclose([to_w, to_h], [1.2 * w, 0.9 * h], atol=1)
+    np.testing.assert_allclose(to_x + to_w / 2, x + w / 2 + 0.1 * before[0, 2], atol=1.5)
+    np.testing.assert_allclose(to_y + to_h / 2, y + h / 2 - 0.05 * before[0, 3], atol=1.5)
 
 
 def test_the_order_of_the_colours_does_not_matter() -> None:
@@ -124,9 +116,11 @@ def test_by_default_limo_looks_twice_and_what_cannot_does_not() -> None:
         assert PeopleDetector(**once).detect(picture()) == plain.detect(picture())  # type: ignore[arg-type]
 
 
-def test_pictures_as_they_are_may_be_looked_at_twice() -> None:
-    found = PeopleDetector(min_height=None, second_look=True).detect(picture())
+def test_pictures_as_they_are_may_be_looked_at_twice_and_one_without_candidates() -> None:
+    detector = PeopleDetector(min_height=None, second_look=True)
+    found = detector.detect(picture())
     assert len(found) > 0 and found.calibration == network().calibration
+    assert len(detector.detect(np.full((300, 200), 90, np.uint8))) == 0
 
 
 def test_what_has_no_second_look_refuses_it() -> None:
@@ -135,10 +129,6 @@ def test_what_has_no_second_look_refuses_it() -> None:
             PeopleDetector(second_look=True, **wrong)  # type: ignore[arg-type]
     with pytest.raises(limo_hog.ParameterTypeError, match="second_look is 'yes'; True, False or None is wanted"):
         PeopleDetector(second_look="yes")  # type: ignore[arg-type]
-
-
-def test_a_picture_without_candidates_needs_no_network() -> None:
-    assert len(PeopleDetector(second_look=True).detect(np.full((300, 200), 90, np.uint8))) == 0
 
 
 @pytest.fixture
@@ -160,20 +150,18 @@ def test_weights_cut_short_or_without_a_card_are_a_named_error(weights: Path) ->
             models._second_look(str(weights))
 
 
-@pytest.mark.parametrize(
-    ("key", "message"),
-    [
-        ("share", "2 finite numbers"),
-        ("layers", "4 finite numbers"),
+def test_a_card_without_one_of_its_numbers_is_a_named_error(weights: Path) -> None:
+    card = weights.with_name(f"{weights.name}.json")
+    whole = card.read_text()
+    for key, message in (
+        ("share", "2 finite"),
+        ("layers", "4 finite"),
         ("slope", "calibration is"),
         ("{", "no model card"),
-    ],
-)
-def test_a_card_without_one_of_its_numbers_is_a_named_error(key: str, message: str, weights: Path) -> None:
-    card = weights.with_name(f"{weights.name}.json")
-    card.write_text(card.read_text().replace(key, "?"))
-    with pytest.raises(limo_hog.ModelFormatError, match=message):
-        models._second_look(str(weights))
+    ):
+        card.write_text(whole.replace(key, "?"))
+        with pytest.raises(limo_hog.ModelFormatError, match=message):
+            models._second_look(str(weights))
 
 
 def test_weights_of_other_layers_are_a_named_error() -> None:
@@ -207,11 +195,9 @@ for image in images:
 
 def answers(backend: str, threads: int) -> list[list[list[float | str]]]:
     photographs = sorted((PHOTOGRAPHS / "real" / "pedestrians").glob("TUD*"))
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, str(threads), *map(str, photographs)],
-        env={**os.environ, "LIMO_HOG_BACKEND": backend}, capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    return [json.loads(line.replace("'", '"')) for line in done.stdout.splitlines()]
+    command = [sys.executable, "-c", PROGRAM, str(threads), *map(str, photographs)]
+    done = subprocess.run(command, env=os.environ | {"LIMO_HOG_BACKEND": backend}, stdout=subprocess.PIPE, check=True)
+    return [json.loads(line.replace(b"'", b'"')) for line in done.stdout.splitlines()]
 
 
 def test_backends_find_the_same_and_processes_and_threads_to_the_bit() -> None:
@@ -219,7 +205,7 @@ def test_backends_find_the_same_and_processes_and_threads_to_the_bit() -> None:
     wanted = answers(first, 1)
     assert any(wanted) and answers(first, 2) == wanted
     for backend in others:
-        for mine, theirs in zip(wanted, answers(backend, 1), strict=True):
+        for rows in zip(wanted, answers(backend, 1), strict=True):
+            mine, theirs = ([(*box, float.fromhex(str(score))) for *box, score in some] for some in rows)
             assert [row[:4] for row in mine] == [row[:4] for row in theirs]
-            scores = [[float.fromhex(str(row[4])) for row in rows] for rows in (mine, theirs)]
-            np.testing.assert_allclose(scores[0], scores[1], atol=1e-4)
+            np.testing.assert_allclose(mine, theirs, atol=1e-4)

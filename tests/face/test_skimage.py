@@ -79,13 +79,9 @@ def differences(seeds: range) -> list[tuple[int, float]]:
     return found
 
 
-def test_any_image_and_arguments_give_scikit_images_numbers() -> None:
-    assert differences(range(100)) == []
-
-
-@pytest.mark.slow
-def test_two_thousand_drawn_cases_give_scikit_images_numbers() -> None:
-    assert differences(range(100, 2100)) == []
+@pytest.mark.parametrize("seeds", [range(100), pytest.param(range(100, 2100), marks=pytest.mark.slow)])
+def test_any_image_and_arguments_give_scikit_images_numbers(seeds: range) -> None:
+    assert differences(seeds) == []
 
 
 @pytest.mark.parametrize("axis", [None, 1, -1])
@@ -146,9 +142,7 @@ def test_gradients_on_the_bounds_of_bins_vote_as_scikit_image_lets_them() -> Non
         (np.zeros((24, 24, 3)), {"channel_axis": 5}, "out of bounds"),
     ],
 )
-def test_what_scikit_image_refuses_is_refused_with_what_is_wanted(
-    image: NDArray[Any], arguments: dict[str, Any], says: str
-) -> None:
+def test_what_scikit_image_refuses_is_refused_with_what_is_wanted(image: Any, arguments: Any, says: str) -> None:
     for function in (skimage.feature.hog, hog):
         with pytest.raises(ValueError, match=says if function is hog else None):
             function(image, **arguments)

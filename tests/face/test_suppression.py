@@ -50,9 +50,8 @@ def test_overlap_is_shared_area_over_the_union_or_over_the_smaller() -> None:
 @pytest.mark.parametrize("threshold", [0.0, 0.3, 0.65, 1.0])
 def test_nms_keeps_what_its_definition_keeps(count: int, threshold: float) -> None:
     boxes, scores = crowd(count, 1 + count // 20)
-    assert nms(boxes, scores, threshold).tolist() == greedy(boxes, scores, threshold, smaller=False)
-    kept = nms(boxes, scores, threshold, intersection_over_smaller)
-    assert kept.tolist() == greedy(boxes, scores, threshold, smaller=True)
+    for smaller, measure in enumerate((intersection_over_union, intersection_over_smaller)):
+        assert nms(boxes, scores, threshold, measure).tolist() == greedy(boxes, scores, threshold, bool(smaller))
 
 
 def test_nms_keeps_what_opencvs_keeps() -> None:

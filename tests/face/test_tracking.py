@@ -29,8 +29,7 @@ def test_two_people_who_pass_each_other_keep_their_numbers_and_leave_trails(name
     seen = [tracker.update(found) for found in walk(score)][2:]
     drawn = [tracker.draw(people, image) for people in seen]
     numbers = [dict(zip(people.boxes[:, 3].tolist(), people.to_dict()["ids"], strict=True)) for people in seen]
-    assert numbers == [numbers[0]] * 18
-    assert {*numbers[0].values()} == {1, 2}
+    assert numbers == [numbers[0]] * 18 and {*numbers[0].values()} == {1, 2}
     assert (drawn[-1] != seen[-1].draw(image))[140, 90:180].any()  # where the shorter one's feet were
     assert tracker.update(Detections.none()).to_dict()["ids"] == []
 
@@ -43,12 +42,9 @@ def test_a_box_below_the_threshold_is_no_new_person_until_the_threshold_is_lower
     assert tracker.lowest == 1.5 - FED
 
 
-def test_an_unknown_tracker_is_named() -> None:
+def test_unknown_and_missing_trackers_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(ParameterError, match=r"'deepsort'; one of bytetrack, ocsort, sort is wanted"):
         Tracker("deepsort")
-
-
-def test_without_trackers_the_line_that_installs_them_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "trackers", None)
     with pytest.raises(MissingExtraError, match=r"tracking people needs trackers: pip install 'limo-hog\[track\]'"):
         Tracker()

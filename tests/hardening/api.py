@@ -11,13 +11,10 @@ from __future__ import annotations
 import argparse
 import faulthandler
 import json
-import mmap
 import resource
 import signal
-import struct
 import subprocess
 import sys
-import tempfile
 import time
 from collections import Counter
 from pathlib import Path
@@ -34,53 +31,34 @@ LATEST = 30
 MEMORY = 3_000_000_000
 
 
-def batch(first: int, count: int, here: mmap.mmap) -> dict[str, Any]:
-    """Make calls `first` to `first + count - 1`."""
+def batch(first: int, count: int) -> None:
+    """Make calls `first` to `first + count - 1`; print of each how it ended, and what is wrong with it."""
 
     def late(_signal: int, _frame: FrameType | None) -> None:
         raise RuntimeError(f"longer than {LATEST} s")
 
     signal.signal(signal.SIGPROF, late)
-    ends: Counter[str] = Counter()
-    findings: list[str] = []
     for number in range(first, first + count):
-        here[:8] = struct.pack("<q", number)
         signal.setitimer(signal.ITIMER_PROF, LATEST)
+        end = wrong = ""
         try:
-            ends[call(number)] += 1
+            end = call(number)
         except Exception as error:
-            told = " ".join(str(error).split())[:300]
-            findings.append(f"call {number}: {type(error).__name__}: {told}")
+            wrong = f"{type(error).__name__}: {' '.join(str(error).split())[:300]}"
         finally:
             signal.setitimer(signal.ITIMER_PROF, 0)
-    return {"ends": ends, "findings": findings}
+        print(json.dumps([end, wrong]), flush=True)
 
 
-def in_a_process(first: int, count: int) -> dict[str, Any]:
-    """Make a batch in a process of its own; where it dies, the call is a finding and the rest follows."""
-    with tempfile.TemporaryFile() as marks:
-        marks.truncate(8)
-        command = [sys.executable, "-m", "tests.hardening.api", "--batch", str(first), str(count)]
-        done = subprocess.run(
-            [*command, "--marks", str(marks.fileno())],
-            capture_output=True,
-            text=True,
-            pass_fds=[marks.fileno()],
-            timeout=7200,
-            check=False,
-        )
-        if done.returncode == 0:
-            answer: dict[str, Any] = json.loads(done.stdout)
-            return answer
-        marks.seek(0)
-        (last,) = struct.unpack("<q", marks.read(8))
-    told = " ".join(done.stderr.split())[-300:]
-    findings = [f"call {last}: the process ended with status {done.returncode}: {told}"]
-    before = in_a_process(first, last - first) if last > first else {"ends": {}, "findings": []}
-    left = first + count - last - 1
-    after = in_a_process(last + 1, left) if left else {"ends": {}, "findings": []}
-    ends = Counter(before["ends"]) + Counter(after["ends"])
-    return {"ends": ends, "findings": [*before["findings"], *findings, *after["findings"]]}
+def in_a_process(first: int, count: int) -> list[list[str]]:
+    """Make a batch in a process of its own: what it printed, and as the last call's what is wrong where it died."""
+    command = [sys.executable, "-m", "tests.hardening.api", "--batch", str(first), str(count)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=7200, check=False)
+    answers = [json.loads(line) for line in done.stdout.splitlines()]
+    if done.returncode:
+        told = " ".join(done.stderr.split())[-300:]
+        answers.append(["", f"the process ended with status {done.returncode}: {told}"])
+    return answers
 
 
 def main() -> int:
@@ -91,7 +69,6 @@ def main() -> int:
     parser.add_argument("--state", type=Path, help="where counts and findings are kept")
     parser.add_argument("--only", type=int, help="make this call alone, in this process")
     parser.add_argument("--batch", type=int, nargs=2, help=argparse.SUPPRESS)
-    parser.add_argument("--marks", type=int, help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.only is not None:
         print(call(args.only) or "answered")
@@ -99,19 +76,18 @@ def main() -> int:
     if args.batch:
         faulthandler.enable()
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-        here = mmap.mmap(args.marks, 8)
-        json.dump(batch(args.batch[0], args.batch[1], here), sys.stdout)
+        batch(*args.batch)
         return 0
     state: dict[str, Any] = {"next": args.first, "ends": {}, "findings": [], "seconds": 0.0}
     if args.state and args.state.exists():
         state = json.loads(args.state.read_text())
     last = args.first + args.calls
     while state["next"] < last:
-        began, count = time.monotonic(), min(BATCH, last - state["next"])
-        found = in_a_process(state["next"], count)
-        state["next"] += count
-        state["ends"] = Counter(state["ends"]) + Counter(found["ends"])
-        state["findings"] += found["findings"]
+        began, first = time.monotonic(), state["next"]
+        answers = in_a_process(first, min(BATCH, last - first))
+        state["next"] += len(answers)
+        state["ends"] = Counter(state["ends"]) + Counter(end for end, wrong in answers if not wrong)
+        state["findings"] += [f"call {number}: {wrong}" for number, (_, wrong) in enumerate(answers, first) if wrong]
         state["seconds"] += time.monotonic() - began
         if args.state:
             args.state.write_text(json.dumps(state, indent=1))

@@ -37,11 +37,10 @@ def detectors() -> list[Any]:
     found: list[Any] = []
     for number, geometry in enumerate(geometries):
         hog: Any = HOGDescriptor(*geometry)
-        found.append(copy.copy(hog))
         model: str | int = {0: "default", 1: "daimler"}.get(number, number)
         svm = coefficients(model, limo_hog, hog.getDescriptorSize())
+        found += [copy.copy(hog), hog]
         hog.setSVMDetector(svm if isinstance(model, str) else svm / 10)
-        found.append(hog)
     return found
 
 
@@ -124,11 +123,8 @@ def boxes_and_weights(found: Any, columns: int) -> tuple[Any, Any]:
 
 def search(a: Arguments) -> None:
     hog, image = a.draw.choice(DETECTORS), a.image()
-    options = a.options(
-        hitThreshold=a.number,
-        winStride=a.stride,
-        padding=a.padding,
-        scale=a.scale,
+    options = a.options(hitThreshold=a.number, winStride=a.stride, padding=a.padding, scale=a.scale)
+    options |= a.options(
         groupThreshold=lambda: a.some(0, 1, 2, 2.7, -1, 0.1, 40),
         useMeanshiftGrouping=lambda: a.some(False, False, True),
         finalThreshold=lambda: a.some(0, 2, None),
@@ -230,11 +226,8 @@ def finders(a: Arguments) -> None:
         nms=lambda: a.some("overlap", "group"),
         overlap=lambda: a.some(None, 0.5, 0, 1, 7),
         group_threshold=lambda: a.some(None, 0, 2, -2),
-        win_stride=a.stride,
-        padding=a.padding,
-        scale=a.scale,
-        second_look=lambda: a.some(False, True),
     )
+    options |= a.options(win_stride=a.stride, padding=a.padding, scale=a.scale, second_look=lambda: a.some(False, True))
     repr(PeopleDetector(**options))
 
 
@@ -256,21 +249,9 @@ def threads(a: Arguments) -> None:
     search(a)
 
 
-#: Each kind of call, and how often of 96 it is made: what takes long is rare.
-WEIGHTS: dict[Callable[[Arguments], None], int] = {
-    search: 8,
-    windows: 16,
-    descriptors: 12,
-    gradients: 14,
-    grouping: 24,
-    construction: 6,
-    svms: 6,
-    threads: 1,
-    finding: 1,
-    finders: 1,
-    detections: 1,
-}
-KINDS = [kind for kind, weight in WEIGHTS.items() for _ in range(weight)]
+#: Each kind of call, as often as it is made: what takes long is rare.
+KINDS = [search] * 8 + [windows] * 16 + [descriptors] * 12 + [gradients] * 14 + [grouping] * 24 + [construction] * 6
+KINDS += [svms] * 6 + [threads, finding, finders, detections]
 
 
 def call(number: int) -> str:

@@ -47,22 +47,19 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as scratch:
         exercise = Path(scratch) / "three.toml"
         exercise.write_text(EXERCISE)
-        alone = []
+        alone, folder = [], Path(scratch) / "class"
         for number, text in enumerate(honest):
             one = Path(scratch) / f"alone{number}"
             one.mkdir()
             (one / "node.py").write_text(text)
             alone.append(grade(one, exercise)["node.py"])
-        folder = Path(scratch) / "class"
         folder.mkdir()
         wanted = {}
         for number in range(count):
-            name = f"s{number:03}.py"
-            if number % 10 == 9:
-                (folder / name).write_text(hostile[number // 10 % len(hostile)])
-            else:
-                (folder / name).write_text(honest[number % len(honest)])
-                wanted[name] = alone[number % len(honest)]
+            name, one_of_ten = f"s{number:03}.py", number % 10 == 9
+            text = hostile[number // 10 % len(hostile)] if one_of_ten else honest[number % len(honest)]
+            (folder / name).write_text(text)
+            wanted |= {} if one_of_ten else {name: alone[number % len(honest)]}
         began = time.monotonic()
         marks = grade(folder, exercise)
         took = time.monotonic() - began

@@ -108,11 +108,7 @@ def cdr(_: Path) -> tuple[list[bytes], Callable[[bytes], None]]:
     return whole, read
 
 
-KINDS: dict[str, Callable[[Path], tuple[list[bytes], Callable[[bytes], None]]]] = {
-    "models": models,
-    "scenarios": scenarios,
-    "cdr": cdr,
-}
+KINDS = {"models": models, "scenarios": scenarios, "cdr": cdr}
 
 
 def run(kind: str, seeds: range, folder: Path) -> tuple[Counter[str], list[str]]:

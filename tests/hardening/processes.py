@@ -17,13 +17,12 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 
-import av
 import cv2
-from tests.cli.material import PICTURE, film_of
+from tests.cli.material import PICTURE, film_of, frames_of
 from tests.hardening.trials import main
 from tests.learn import bollards
 
@@ -120,41 +119,41 @@ def _place(folder: Path, name: str) -> Path:
 
 
 def _written(place: Path) -> dict[str, Path]:
-    files = {
-        str(path.relative_to(place)): path for path in place.rglob("*") if not path.is_symlink() and path.is_file()
-    }
-    return {name: path for name, path in files.items() if not path.name.startswith(".")}
+    files = (path for path in place.rglob("[!.]*") if path.is_file() and not path.is_symlink())
+    return {str(path.relative_to(place)): path for path in files}
+
+
+def _json_or_lines(path: Path) -> bool:
+    text = path.read_text()
+    with suppress(ValueError):
+        json.loads(text)
+        return True
+    return [*map(json.loads, text.splitlines())] == [] or text.endswith("\n")
+
+
+def _table(path: Path) -> bool:
+    rows = csv.reader(path.read_text().splitlines())
+    return path.read_text().endswith("\n") and len({len(row) for row in rows}) == 1
+
+
+#: How a file that a command has written is told to be whole, by its suffix.
+WHOLE: dict[str, Callable[[Path], object]] = {
+    **dict.fromkeys((".json", ".jsonl"), _json_or_lines),
+    **dict.fromkeys((".html", ".py"), lambda path: path.read_text().strip()),
+    ".csv": _table,
+    ".mp4": frames_of,
+    ".mcap": lambda path: sum(1 for _ in read_bag(path)),
+    ".yml": lambda path: HOGDescriptor().load(path),
+    ".png": lambda path: cv2.imread(str(path)) is not None,
+}
 
 
 def broken(path: Path) -> str:
     """What is wrong with a file that a command has written; nothing where it is whole."""
     try:
-        if path.suffix in (".json", ".jsonl"):
-            text = path.read_text()
-            with suppress(ValueError):
-                json.loads(text)
-                return ""
-            if not text.endswith("\n") and text:
-                return "half a line"
-            for line in text.splitlines():
-                json.loads(line)
-        elif path.suffix == ".csv":
-            rows = list(csv.reader(path.read_text().splitlines()))
-            return "" if path.read_text().endswith("\n") and len(set(map(len, rows))) == 1 else "half a table"
-        elif path.suffix == ".mp4":
-            with av.open(path) as film:
-                return "" if sum(1 for _ in film.decode(video=0)) else "no frame"
-        elif path.suffix == ".mcap":
-            return "" if sum(1 for _ in read_bag(path)) else "no message"
-        elif path.suffix == ".yml":
-            return "" if HOGDescriptor().load(path) else "no model"
-        elif path.suffix == ".png":
-            return "" if cv2.imread(str(path)) is not None else "no picture"
-        elif path.suffix in (".html", ".py"):
-            return "" if path.read_text().rstrip() else "empty"
+        return "" if WHOLE.get(path.suffix, Path.exists)(path) else "empty, or cut off"
     except Exception as error:
         return repr(error)
-    return ""
 
 
 def terminals(_: str, numbers: range, folder: Path) -> tuple[Counter[str], list[str]]:
@@ -188,10 +187,9 @@ def terminals(_: str, numbers: range, folder: Path) -> tuple[Counter[str], list[
 
 
 def _in_terminal(how: str, typed: str, place: Path) -> subprocess.CompletedProcess[bytes]:
-    shell, env = ("", ASCII) if how == "ascii" else (how, {})
+    shell, env = ("", os.environ | ASCII) if how == "ascii" else (how, None)
     command = ["bash", "-c", f'set -o pipefail; "$@" {shell}', "-", *LIMO_HOG, *typed.split()]
-    surroundings = {**os.environ, **env}
-    return subprocess.run(command, check=False, capture_output=True, cwd=place, timeout=LATEST_S, env=surroundings)
+    return subprocess.run(command, check=False, capture_output=True, cwd=place, timeout=LATEST_S, env=env)
 
 
 @contextmanager
@@ -204,14 +202,12 @@ def _robot() -> Iterator[None]:
         assert robot.wait(RUNS_ON_S) == 128 + signal.SIGTERM
 
 
-def _running(mark: str) -> list[int]:
+def _running(mark: str) -> Iterator[int]:
     """The processes whose environment has a mark."""
-    found = []
     for environ in Path("/proc").glob("[0-9]*/environ"):
         with suppress(OSError):
             if f"{MARK}={mark}\0".encode() in environ.read_bytes():
-                found.append(int(environ.parent.name))
-    return found
+                yield int(environ.parent.name)
 
 
 def kills(_: str, numbers: range, folder: Path) -> tuple[Counter[str], list[str]]:
@@ -228,23 +224,17 @@ def kills(_: str, numbers: range, folder: Path) -> tuple[Counter[str], list[str]
         typed = LONG[number % len(LONG)]
         sent = draw.choice((signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP))
         place, mark = _place(folder, f"k{number}"), f"{os.getpid()}.{number}"
-        child = subprocess.Popen(
-            [*LIMO_HOG, *typed.split()],
-            cwd=place,
-            env={**os.environ, MARK: mark},
-            stderr=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            start_new_session=True,
-        )
+        command, env, silent = [*LIMO_HOG, *typed.split()], os.environ | {MARK: mark}, subprocess.DEVNULL
+        child = subprocess.Popen(command, cwd=place, env=env, stderr=silent, stdout=silent, start_new_session=True)
         with suppress(subprocess.TimeoutExpired):
             child.wait(draw.uniform(0.2, 4.0))
         told = "ended before" if child.returncode is not None else sent.name
         if child.returncode is None:
             (os.killpg if draw.random() < 0.5 else os.kill)(child.pid, sent)
         began = time.monotonic()
-        while child.poll() is None or _running(mark):
+        while child.poll() is None or any(_running(mark)):
             if time.monotonic() - began > RUNS_ON_S:
-                findings.append(f"kill {number}: {typed}, {told}: runs on after {RUNS_ON_S} s: {_running(mark)}")
+                findings.append(f"kill {number}: {typed}, {told}: runs on after {RUNS_ON_S} s: {[*_running(mark)]}")
                 for process in _running(mark):
                     os.kill(process, signal.SIGKILL)
                 break

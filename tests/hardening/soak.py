@@ -73,14 +73,7 @@ def memory_mb(process: int | str = "self") -> float:
     return int(told["RssAnon"].split()[0]) * 1024 / 1e6
 
 
-def keep_nothing_free() -> None:
-    """Let glibc give freed blocks of 128 kB and more back at once: by itself it learns to keep them."""
-    m_mmap_threshold = -3
-    ctypes.CDLL("libc.so.6").mallopt(m_mmap_threshold, 1 << 17)
-
-
 def descriptors() -> int:
-    """Return how many files and connections are open."""
     return len(list(Path("/proc/self/fd").iterdir()))
 
 
@@ -95,8 +88,7 @@ def report(name: str, unit: str, times: list[float], values: list[float], of: in
 
 def watch_a_page(seconds: float, seed: int) -> None:
     """Follow before an audience."""
-    hours: list[float] = []
-    memory: list[float] = []
+    hours, memory = list[float](), list[float]()
     # Of the thread that simulates, so that what else the machine does counts little; without growing lists.
     took = array("d", bytes(8 * STEPS))
     made, last = 0, time.thread_time()
@@ -134,9 +126,8 @@ async def read_pages(url: str) -> None:
     async def client(*, reads: bool) -> None:
         while True:
             async with aiohttp.ClientSession() as session, session.ws_connect(url + "live", max_msg_size=0) as page:
-                if reads:
-                    async for _ in page:
-                        pass
+                while reads and not page.closed:
+                    await page.receive()
                 # (The server drops it; then another comes.)
                 await asyncio.sleep(20)
 
@@ -146,8 +137,7 @@ async def read_pages(url: str) -> None:
 
 def run_a_node(seconds: float, seed: int) -> None:
     """Run a node in a process of its own, and score it as it goes."""
-    rows: list[tuple[float, float, float]] = []
-    pid: list[str] = []
+    rows, pid = list[tuple[float, float, float]](), list[str]()
 
     def watch(step: Step) -> None:
         if not rows or step.log.time / 3600 - rows[-1][0] >= EVERY_S / 3600:
@@ -192,11 +182,11 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--url", help=argparse.SUPPRESS)
     args = parser.parse_args()
-    keep_nothing_free()
-    if args.what == "view":
-        watch_a_page(args.seconds, args.seed)
-    elif args.what == "node":
-        run_a_node(args.seconds, args.seed)
+    # Let glibc give freed blocks of 128 kB and more back at once: by itself it learns to keep them.
+    m_mmap_threshold = -3
+    ctypes.CDLL("libc.so.6").mallopt(m_mmap_threshold, 1 << 17)
+    if args.what in ("view", "node"):
+        {"view": watch_a_page, "node": run_a_node}[args.what](args.seconds, args.seed)
     elif args.what == "detect":
         detect(args.count)
     else:

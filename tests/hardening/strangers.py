@@ -23,6 +23,7 @@ from pathlib import Path
 # As `detect` sets them before OpenCV is imported.
 os.environ |= {"OPENCV_LOG_LEVEL": "SILENT", "OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_VIDEOIO_PRIORITY_CV_MJPEG": "0"}
 
+import cv2
 from tests.cli.material import PICTURE, film_of
 from tests.hardening.files import damaged
 from tests.hardening.trials import main
@@ -131,9 +132,8 @@ def _import_what_it_needs(arguments: list[str], folder: Path) -> None:
     code = (
         "import sys; from limo_hog.cli.main import main; code = main(); print(*sys.modules, sep='\\n'); sys.exit(code)"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code, *arguments], check=False, capture_output=True, text=True, cwd=folder
-    )
+    command = [sys.executable, "-c", code, *arguments]
+    done = subprocess.run(command, check=False, capture_output=True, text=True, cwd=folder)
     if done.returncode:
         raise RuntimeError(f"a whole file is refused, so that nothing is tried: {done.stderr}")
     for name in done.stdout.splitlines():
@@ -160,17 +160,11 @@ def _whole(kind: str, folder: Path) -> list[tuple[bytes, bytes]]:
         elif suffix == ".mp4":
             film_of(path, 4)
         else:
-            _film_by_opencv(path)
+            film = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 10, PICTURE.shape[1::-1])
+            for _ in range(4):
+                film.write(PICTURE)
+            film.release()
     return [(os.fsencode(path.suffix), path.read_bytes()) for path in sorted(folder.glob("whole.*"))]
-
-
-def _film_by_opencv(path: Path) -> None:
-    import cv2
-
-    film = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 10, PICTURE.shape[1::-1])
-    for _ in range(4):
-        film.write(PICTURE)
-    film.release()
 
 
 def many(kind: str, numbers: range, folder: Path) -> tuple[Counter[str], list[str]]:
@@ -225,11 +219,6 @@ def single(kind: str, numbers: range, folder: Path) -> tuple[Counter[str], list[
     return ends, findings
 
 
-KINDS = {"names": many, "pictures": many, "films": many, "labels": single, "models": single} | {
-    "scenarios": single,
-    "recordings": single,
-}
-
-
 if __name__ == "__main__":
-    sys.exit(main(KINDS, __doc__ or "", 1000))
+    kinds = dict.fromkeys("labels models scenarios recordings".split(), single)
+    sys.exit(main(kinds | dict.fromkeys("names pictures films".split(), many), __doc__ or "", 1000))

@@ -30,17 +30,10 @@ def file(tmp_path: Path, scene: NDArray[np.uint8]) -> Path:
     return path
 
 
-def assert_same(found: Detections, expected: Detections) -> None:
-    assert len(expected) > 0
-    np.testing.assert_array_equal(found.boxes, expected.boxes)
-    np.testing.assert_array_equal(found.scores, expected.scores)
-
-
 def test_a_file_and_a_pil_image_hold_the_same_people_as_the_array(file: Path, scene: NDArray[np.uint8]) -> None:
     detector = PeopleDetector(min_height=None)
-    expected = detector.detect(scene)
     for image in (file, str(file), Image.open(file)):
-        assert_same(detector.detect(image), expected)
+        assert detector.detect(image) == detector.detect(scene) != Detections.none()
 
 
 @pytest.mark.parametrize("mode", ["RGB", "RGBA", "P", "L", "1", "CMYK"])
@@ -57,28 +50,19 @@ def test_pil_images_of_more_bits_are_refused(mode: str) -> None:
         PeopleDetector().detect(Image.new(mode, (200, 200)))
 
 
-def test_a_file_that_is_no_picture_is_named(tmp_path: Path) -> None:
-    for content, told in ((b"text", "not an image"), (b"", "the file is empty")):
-        path = tmp_path / "a.jpg"
-        path.write_bytes(content)
-        with pytest.raises(ImageError, match=f"a.jpg: {told}"):
-            PeopleDetector().detect(path)
-    with pytest.raises(FileNotFoundError, match=r"none\.jpg"):
-        PeopleDetector().detect(tmp_path / "none.jpg")
-    with pytest.raises(IsADirectoryError):
-        PeopleDetector().detect(tmp_path)
-
-
 @pytest.mark.parametrize(
-    ("name", "told"),
+    ("name", "kind", "told"),
     [
-        ("", "the name of the picture is empty"),
-        ("a\0b.jpg", "is no file's name"),
-        ("\ud800.jpg", "is no file's name"),
+        ("text.jpg", ImageError, "text.jpg: not an image"),
+        ("none.jpg", FileNotFoundError, "none.jpg"),
+        (".", IsADirectoryError, "directory"),
+        ("", ImageError, "the name of the picture is empty"),
+        *((name, ImageError, "is no file's name") for name in ("a\0b.jpg", "\ud800.jpg")),
     ],
 )
-def test_a_name_that_no_file_can_have_is_refused(name: str, told: str) -> None:
-    with pytest.raises(ImageError, match=told):
+def test_a_name_of_no_picture_is_refused(name: str, kind: type[Exception], told: str, here: Path) -> None:
+    (here / "text.jpg").write_bytes(b"text")
+    with pytest.raises(kind, match=told):
         PeopleDetector().detect(name)
 
 
@@ -89,9 +73,8 @@ def without(modules: str, code: str, *arguments: object) -> subprocess.Completed
 
 
 def test_without_opencv_pillow_reads_the_file(file: Path, tmp_path: Path, scene: NDArray[np.uint8]) -> None:
-    code = "print(limo_hog.PeopleDetector(min_height=None).detect(sys.argv[1]).boxes.tolist())"
-    done = without("cv2", code, file)
-    assert done.stdout.strip() == str(PeopleDetector(min_height=None).detect(scene).boxes.tolist()), done.stderr
+    done = without("cv2", "print(limo_hog.PeopleDetector().detect(sys.argv[1]).boxes.tolist())", file)
+    assert done.stdout.strip() == str(PeopleDetector().detect(scene).boxes.tolist()), done.stderr
 
     # Turned by its EXIF data, as OpenCV turns it.
     turned = tmp_path / "turned.jpg"

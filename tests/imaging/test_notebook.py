@@ -6,9 +6,10 @@ import base64
 import gc
 import pickle
 import re
+import sys
 import weakref
-from html.parser import HTMLParser
 from pathlib import Path
+from xml.etree import ElementTree
 
 import cv2
 import numpy as np
@@ -21,29 +22,9 @@ from limo_hog.cli.support.scene import street
 from limo_hog.imaging.notebook import ROWS, reduced
 
 
-class _Reader(HTMLParser):
-    def __init__(self) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.words: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:  # noqa: ARG002 — the base's
-        if tag != "img":
-            self.open.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-    def handle_data(self, data: str) -> None:
-        self.words.append(data)
-
-
 def words(html: str) -> list[str]:
     """Read well-formed HTML and return its texts."""
-    reader = _Reader()
-    reader.feed(html)
-    assert not reader.open
-    return reader.words
+    return [*ElementTree.fromstring(re.sub("(<img[^>]*)>", r"\1/>", html)).itertext()]
 
 
 def picture(html: str) -> NDArray[np.uint8] | None:
@@ -66,19 +47,14 @@ def test_the_table_holds_the_people_and_the_picture_their_boxes(file: Path) -> N
         people = PeopleDetector().detect(image)
         html = people._repr_html_()
         told = words(html)
-        for box, label in zip(people.boxes.tolist(), people.labels, strict=True):
-            assert set(map(str, box)) <= set(told) and label in told
+        assert {*people.labels, *map(str, people.boxes.ravel().tolist())} <= {*told}
+        assert image is not file or "a<b>&.png" in "".join(told)
         shown = picture(html)
         assert shown is not None
         # JPEG changes a little; a picture without boxes or with swapped colours is much further away.
         near = np.abs(shown.astype(int) - people.draw(scene)).mean()
         assert near < 3 < np.abs(shown.astype(int) - people.draw(scene)[..., ::-1]).mean()
         assert len(html) < 200_000
-
-
-def test_a_files_name_is_escaped(file: Path) -> None:
-    html = PeopleDetector().detect(file)._repr_html_()
-    assert "a<b>" not in html and "a&lt;b&gt;&amp;.png" in html
 
 
 def test_detections_keep_no_image_alive_and_show_their_table_when_it_is_gone() -> None:
@@ -95,9 +71,8 @@ def test_detections_keep_no_image_alive_and_show_their_table_when_it_is_gone() -
 def test_a_file_that_is_gone_and_a_missing_opencv_leave_the_table(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     people = PeopleDetector().detect(file)
     with monkeypatch.context() as patch:
-        for name in ("cv2", "limo_hog.imaging.writing"):
-            patch.setitem(__import__("sys").modules, name, None)
-        patch.delitem(__import__("sys").modules, "limo_hog.imaging.writing")
+        patch.setitem(sys.modules, "cv2", None)
+        patch.delitem(sys.modules, "limo_hog.imaging.writing", raising=False)
         assert picture(people._repr_html_()) is None
     assert picture(people._repr_html_()) is not None
     file.unlink()
@@ -107,9 +82,7 @@ def test_a_file_that_is_gone_and_a_missing_opencv_leave_the_table(file: Path, mo
 def test_copies_for_other_processes_hold_boxes_and_scores() -> None:
     people = PeopleDetector().detect(street(640, 480, 3))
     copy = pickle.loads(pickle.dumps(people))
-    np.testing.assert_array_equal(copy.boxes, people.boxes)
-    np.testing.assert_array_equal(copy.probabilities, people.probabilities)
-    assert len(words(copy._repr_html_())) > 10
+    assert copy == people and len(words(copy._repr_html_())) > 10
 
 
 def test_nobody_and_a_crowd_are_told_in_a_line() -> None:
@@ -126,5 +99,4 @@ def test_large_pictures_are_reduced_by_means(shape: tuple[int, ...]) -> None:
     image = np.full(shape, 100, np.uint8)
     small, n = reduced(image)
     assert max(small.shape[:2]) <= 640 and max(shape[:2]) <= 640 * n
-    assert (small == 100).all()
-    assert small.ndim == 3
+    assert (small == 100).all() and small.ndim == 3

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -13,14 +14,9 @@ WIDTH, HEIGHT = 320, 240
 
 
 def draw(rng: np.random.Generator) -> tuple[NDArray[np.uint8], list[list[float]]]:
-    """Draw one picture.
-
-    Returns
-    -------
-    image, boxes
-        uint8 (240, 320, 3) BGR, and x, y, width, height [px] of each of one to three bollards.
-    """
-    canvas = _ground(rng)
+    """Draw uint8 (240, 320, 3) BGR; return it with x, y, width, height [px] of each of one to three bollards."""
+    slope = np.linspace(rng.uniform(60, 200), rng.uniform(60, 200), HEIGHT)[:, None, None]
+    canvas = np.broadcast_to(slope, (HEIGHT, WIDTH, 3)) + rng.normal(0, 8, 3)
     for _ in range(rng.integers(10, 30)):
         _clutter(canvas, rng)
     boxes: list[list[float]] = []
@@ -36,11 +32,6 @@ def draw(rng: np.random.Generator) -> tuple[NDArray[np.uint8], list[list[float]]
     return np.clip(canvas, 0, 255).astype(np.uint8), boxes
 
 
-def _ground(rng: np.random.Generator) -> NDArray[np.float64]:
-    slope = np.linspace(rng.uniform(60, 200), rng.uniform(60, 200), HEIGHT)[:, None, None]
-    return np.broadcast_to(slope, (HEIGHT, WIDTH, 3)) + rng.normal(0, 8, 3)
-
-
 def _clutter(canvas: NDArray[np.float64], rng: np.random.Generator) -> None:
     """Draw a board, a ball or a pole: edges of all directions, none of them a bollard."""
     colour = rng.uniform(20, 235, 3).tolist()
@@ -48,38 +39,27 @@ def _clutter(canvas: NDArray[np.float64], rng: np.random.Generator) -> None:
     size = int(rng.integers(6, 60))
     kind = rng.integers(3)
     if kind == 0:
-        cv2.rectangle(
-            canvas, (x, y), (x + size, y + int(size * rng.uniform(0.4, 2.5))), colour, cv2.FILLED, cv2.LINE_AA
-        )
+        cv2.rectangle(canvas, (x, y), (x + size, y + int(size * rng.uniform(0.4, 2.5))), colour, cv2.FILLED)
     elif kind == 1:
-        cv2.circle(canvas, (x, y), size // 2, colour, cv2.FILLED, cv2.LINE_AA)
+        cv2.circle(canvas, (x, y), size // 2, colour, cv2.FILLED)
     else:
-        cv2.line(
-            canvas, (x, y), (x + size, y + int(rng.integers(-80, 80))), colour, int(rng.integers(1, 6)), cv2.LINE_AA
-        )
+        cv2.line(canvas, (x, y), (x + size, y + int(rng.integers(-80, 80))), colour, int(rng.integers(1, 6)))
 
 
-def _bollard(
-    canvas: NDArray[np.float64], rng: np.random.Generator, x: float, y: float, width: float, height: float
-) -> None:
+def _bollard(canvas: Any, rng: np.random.Generator, x: float, y: float, width: float, height: float) -> None:
     """Draw a post with a round head on a broad foot, and two bands."""
     ground = float(canvas[int(y + height / 2), int(x + width / 2)].mean())
     body = ground + rng.choice([-1, 1]) * rng.uniform(50, 90)
     body = float(np.clip(body if 10 < body < 245 else 2 * ground - body, 10, 245))
+    post, foot, bands = (0.3, 0.2, 0.9), (0.5, 0.88, 1.0), ((0.3, 0.32, 0.4), (0.3, 0.48, 0.56))
     middle = x + width / 2
-    parts = [
-        ((middle - 0.30 * width, y + 0.20 * height), (middle + 0.30 * width, y + 0.90 * height), body),
-        ((middle - 0.50 * width, y + 0.88 * height), (middle + 0.50 * width, y + height), body),
-        ((middle - 0.30 * width, y + 0.32 * height), (middle + 0.30 * width, y + 0.40 * height), 255 - body),
-        ((middle - 0.30 * width, y + 0.48 * height), (middle + 0.30 * width, y + 0.56 * height), 255 - body),
-    ]
-    for (left, top), (right, bottom), gray in parts:
-        corners = np.rint([left, top, right, bottom]).astype(int).tolist()
-        cv2.rectangle(canvas, tuple(corners[:2]), tuple(corners[2:]), [gray] * 3, cv2.FILLED)
-    head = round(middle), round(y + 0.14 * height)
-    cv2.ellipse(
-        canvas, head, (round(0.42 * width), round(0.14 * height)), 0, 0, 360, [body] * 3, cv2.FILLED, cv2.LINE_AA
-    )
+    for (half, top, bottom), gray in ((post, body), (foot, body), *((band, 255 - body) for band in bands)):
+        left, right = round(middle - half * width), round(middle + half * width)
+        cv2.rectangle(
+            canvas, (left, round(y + top * height)), (right, round(y + bottom * height)), [gray] * 3, cv2.FILLED
+        )
+    head, axes = (round(middle), round(y + 0.14 * height)), (round(0.42 * width), round(0.14 * height))
+    cv2.ellipse(canvas, head, axes, 0, 0, 360, [body] * 3, cv2.FILLED)
 
 
 def write(folder: Path, pictures: int, seed: int) -> None:

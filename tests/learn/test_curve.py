@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from pycocotools import mask
 from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
 
@@ -65,45 +66,28 @@ def cocos_average_precision(found: Found, labelled: Labelled) -> float:
 
 def slow_lamr(found: Found, labelled: Labelled) -> float:
     """The definition: every threshold tried, every picture matched anew by loops."""
-    objects = sum(int((~ignored).sum()) for _, ignored in labelled)
+    # COCO's overlaps: intersection over union, and where a box is ignored the hit's share in it.
+    overlaps = [
+        mask.iou(hits, boxes, ignored) if len(boxes) else np.empty((len(hits), 0))
+        for (hits, _), (boxes, ignored) in zip(found, labelled, strict=True)
+    ]
     points = []
     for threshold in sorted({float(s) for _, scores in found for s in scores}):
         right = wrong = 0
-        for (hits, scores), (boxes, ignored) in zip(found, labelled, strict=True):
+        for rows, (_, scores), (_, ignored) in zip(overlaps, found, labelled, strict=True):
             taken: set[int] = set()
-            for hit, score in zip(hits.tolist(), scores.tolist(), strict=True):
-                if score < threshold:
-                    continue
-                best, at = 0.5, None
-                for i, box in enumerate(boxes.tolist()):
-                    if i not in taken and not ignored[i] and _iou(hit, box) >= best:
-                        best, at = _iou(hit, box), i
-                if at is not None:
-                    taken.add(at)
-                    right += 1
-                elif not any(_within(hit, box) >= 0.5 for box, i in zip(boxes.tolist(), ignored, strict=True) if i):
-                    wrong += 1
-        points.append((wrong / len(found), right / objects))
+            for row in rows[scores >= threshold]:
+                near = [(row[i], i) for i in np.flatnonzero(~ignored) if i not in taken and row[i] >= 0.5]
+                taken |= {max(near)[1]} if near else set()
+                right += bool(near)
+                wrong += not near and not (row[ignored] >= 0.5).any()
+        points.append((wrong / len(found), right / sum(int((~ignored).sum()) for _, ignored in labelled)))
     misses = []
     for i in range(9):
         reference = 10 ** (-2 + 0.25 * i)
         recall = max((r for fppi, r in points if fppi <= reference + 1e-9), default=0.0)
         misses.append(max(1 - recall, 1e-10))
     return math.exp(sum(map(math.log, misses)) / 9)
-
-
-def _shared(a: list[float], b: list[float]) -> float:
-    width = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])
-    height = min(a[1] + a[3], b[1] + b[3]) - max(a[1], b[1])
-    return max(0.0, width) * max(0.0, height)
-
-
-def _iou(a: list[float], b: list[float]) -> float:
-    return _shared(a, b) / (a[2] * a[3] + b[2] * b[3] - _shared(a, b))
-
-
-def _within(a: list[float], b: list[float]) -> float:
-    return _shared(a, b) / (a[2] * a[3])
 
 
 @pytest.mark.parametrize("seed", range(5))

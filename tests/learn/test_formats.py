@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,74 +12,42 @@ from limo_hog.learn.formats import read_labels
 from limo_hog.learn.labels import Box, LabelError, LabelWarning, Picture, choose, inside
 
 WIDTH, HEIGHT = 200, 100
-#: Two people in the first picture, one of them to be ignored; none in the second.
-PEOPLE = [Box("person", 20, 10, 30, 80), Box("person", 120, 40, 20, 50, ignored=True)]
+#: Label files of each kind: two people in a.png, the second to be ignored where the kind can say so; nobody in b.png.
+KINDS = {
+    "VOC": {
+        "Annotations/a.xml": "<annotation><filename>a.png</filename><object><name>person</name><difficult>0</difficult>"
+        "<bndbox><xmin>21</xmin><ymin>11</ymin><xmax>50</xmax><ymax>90</ymax></bndbox></object><object><name>person"
+        "</name><difficult>1</difficult><bndbox><xmin>121</xmin><ymin>41</ymin><xmax>140</xmax><ymax>90</ymax></bndbox>"
+        "</object></annotation>",
+        "Annotations/b.xml": "<annotation><filename>b.png</filename></annotation>",
+    },
+    "COCO": {
+        "coco.json": '{"images": [{"id": 7, "file_name": "a.png"}, {"id": 9, "file_name": "b.png"}], "annotations":'
+        '[{"image_id": 7, "category_id": 3, "bbox": [20, 10, 30, 80], "iscrowd": 0},'
+        '{"image_id": 7, "category_id": 3, "bbox": [120, 40, 20, 50], "iscrowd": 1}],'
+        '"categories": [{"id": 3, "name": "person"}]}'
+    },
+    "imglab": {
+        "imglab.xml": "<?xml version='1.0'?><dataset><name>x</name><images><image file='a.png'>"
+        "<box top='10' left='20' width='30' height='80' ignore='0'><label>person</label></box>"
+        "<box top='40' left='120' width='20' height='50' ignore='1'><label>person</label></box></image>"
+        "<image file='b.png'/></images></dataset>"
+    },
+    "CVAT": {
+        "cvat.xml": '<annotations><image id="0" name="a.png"><box label="person" occluded="0" xtl="20" ytl="10"'
+        ' xbr="50" ybr="90"/><box label="person" occluded="0" xtl="120" ytl="40" xbr="140" ybr="90"/></image>'
+        '<image id="1" name="b.png"/></annotations>'
+    },
+    "YOLO": {"labels/a.txt": "0 .175 .5 .15 .8\n0 .65 .65 .1 .5\n", "labels/classes.txt": "person\ndog\n"},
+    "boxes": {"boxes.json": '{"a.png": [[20, 10, 30, 80], [120, 40, 20, 50]], "b.png": []}'},
+}
 
 
-def _voc(folder: Path) -> Path:
-    things = "".join(
-        f"<object><name>{b.label}</name><difficult>{int(b.ignored)}</difficult><bndbox><xmin>{b.x + 1}</xmin>"
-        f"<ymin>{b.y + 1}</ymin><xmax>{b.x + b.width}</xmax><ymax>{b.y + b.height}</ymax></bndbox></object>"
-        for b in PEOPLE
-    )
-    labels = folder / "Annotations"
-    labels.mkdir()
-    for name, inner in (("a", things), ("b", "")):
-        (labels / f"{name}.xml").write_text(f"<annotation><filename>{name}.png</filename>{inner}</annotation>")
-    return folder
-
-
-def _coco(folder: Path) -> Path:
-    notes = [
-        {"image_id": 7, "category_id": 3, "bbox": [b.x, b.y, b.width, b.height], "iscrowd": int(b.ignored)}
-        for b in PEOPLE
-    ]
-    images = [{"id": 7, "file_name": "a.png"}, {"id": 9, "file_name": "b.png"}]
-    path = folder / "instances.json"
-    path.write_text(json.dumps({"images": images, "annotations": notes, "categories": [{"id": 3, "name": "person"}]}))
-    return path
-
-
-def _imglab(folder: Path) -> Path:
-    boxes = "".join(
-        f"<box top='{b.y}' left='{b.x}' width='{b.width}' height='{b.height}' ignore='{int(b.ignored)}'>"
-        f"<label>{b.label}</label></box>"
-        for b in PEOPLE
-    )
-    path = folder / "imglab.xml"
-    images = f"<image file='a.png'>{boxes}</image><image file='b.png'/>"
-    path.write_text(f"<?xml version='1.0'?><dataset><name>x</name><images>{images}</images></dataset>")
-    return path
-
-
-def _cvat(folder: Path) -> Path:
-    boxes = "".join(
-        f'<box label="{b.label}" occluded="0" xtl="{b.x}" ytl="{b.y}" xbr="{b.x + b.width}" ybr="{b.y + b.height}"/>'
-        for b in PEOPLE
-    )
-    path = folder / "cvat.xml"
-    path.write_text(
-        f'<annotations><image id="0" name="a.png">{boxes}</image><image id="1" name="b.png"/></annotations>'
-    )
-    return path
-
-
-def _yolo(folder: Path) -> Path:
-    lines = [
-        f"0 {(b.x + b.width / 2) / WIDTH} {(b.y + b.height / 2) / HEIGHT} {b.width / WIDTH} {b.height / HEIGHT}"
-        for b in PEOPLE
-    ]
-    (folder / "labels").mkdir()
-    (folder / "labels" / "a.txt").write_text("\n".join(lines) + "\n")
-    (folder / "labels" / "classes.txt").write_text("person\ndog\n")
-    return folder
-
-
-def _boxes_json(folder: Path) -> Path:
-    (folder / "boxes.json").write_text(
-        json.dumps({"a.png": [[b.x, b.y, b.width, b.height] for b in PEOPLE], "b.png": []})
-    )
-    return folder
+def written(kind: str, folder: Path) -> Path:
+    for name, text in KINDS[kind].items():
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_text(text)
+    return folder / name if kind in ("COCO", "imglab", "CVAT") else folder
 
 
 @pytest.fixture
@@ -91,21 +57,20 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("write", [_voc, _coco, _imglab, _cvat, _yolo, _boxes_json])
-def test_every_kind_gives_the_same_boxes(write: Callable[[Path], Path], folder: Path) -> None:
-    pictures = read_labels(write(folder))
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_gives_the_same_boxes(kind: str, folder: Path) -> None:
+    pictures = read_labels(written(kind, folder))
     assert [picture.path.resolve().name for picture in pictures] == ["a.png", "b.png"]
     boxes, ignored = pictures[0].arrays()
     assert boxes == pytest.approx(np.array([[20, 10, 30, 80], [120, 40, 20, 50]]), abs=1e-9)
-    # Not all kinds can say that a box is to be ignored, or what it is.
-    if write in (_voc, _coco, _imglab):
+    if kind in ("VOC", "COCO", "imglab"):
         assert ignored.tolist() == [False, True]
-    assert {box.label for box in pictures[0].boxes} == {"" if write is _boxes_json else "person"}
+    assert {box.label for box in pictures[0].boxes} == {"" if kind == "boxes" else "person"}
     assert pictures[1].boxes == ()
 
 
 def test_pictures_may_lie_elsewhere(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
-    path = _coco(tmp_path_factory.mktemp("elsewhere"))
+    path = written("COCO", tmp_path_factory.mktemp("elsewhere"))
     with pytest.raises(LabelError, match=r"2 of which are not there, a\.png for one; say where .* --pictures"):
         read_labels(path)
     assert len(read_labels(path, folder / "images")) == 2
@@ -128,7 +93,7 @@ def test_pictures_may_lie_elsewhere(folder: Path, tmp_path_factory: pytest.TempP
         (
             "x.json",
             '{"images": [], "annotations": [{"image_id": 1, "bbox": [1, 2, 3, 4], "iscrowd": "no"}]}',
-            "iscrowd or ignore is",
+            "iscrowd or",
         ),
         ("x.xml", "<html/>", r"its outermost tag is <html>; wanted is VOC's"),
         ("x.xml", "<annotation", "wanted is VOC's"),
@@ -151,22 +116,19 @@ def test_other_files_are_refused_in_one_line(name: str, text: str, complaint: st
 
 @pytest.mark.parametrize("name", ["a.txt", "classes.txt"])
 def test_yolo_text_in_another_encoding_is_named(name: str, folder: Path) -> None:
-    (_yolo(folder) / "labels" / name).write_bytes("Fußgänger".encode("latin-1"))
+    (written("YOLO", folder) / "labels" / name).write_bytes("Fußgänger".encode("latin-1"))
     with pytest.raises(LabelError, match=rf"{name} is no text in UTF-8.*save it as UTF-8"):
         read_labels(folder)
 
 
-def test_a_folder_without_labels_says_what_is_wanted(folder: Path) -> None:
+def test_a_folder_without_labels_or_with_several_files_is_refused(folder: Path) -> None:
     with pytest.raises(LabelError, match="holds no labels; wanted is a folder of VOC XML"):
         read_labels(folder)
     with pytest.raises(LabelError, match="no such file or folder"):
         read_labels(folder / "missing")
-
-
-def test_several_label_files_are_not_guessed_at(folder: Path) -> None:
-    path = _coco(folder)
+    path = written("COCO", folder)
     path.with_name("other.json").write_text(path.read_text())
-    with pytest.raises(LabelError, match=r"several label files: instances\.json, other\.json; name one"):
+    with pytest.raises(LabelError, match=r"several label files: coco\.json, other\.json; name one"):
         read_labels(folder)
 
 
@@ -179,12 +141,9 @@ def test_one_label_is_chosen_and_the_others_are_left_out() -> None:
         choose(pictures, "cow")
     with pytest.raises(LabelError, match="no labelled box in 1 pictures"):
         choose([Picture(Path("a.png"), ())], None)
-
-
-def test_labels_of_nothing_but_boxes_without_area_are_refused() -> None:
-    pictures = [Picture(Path("a.png"), (Box("", 2, 2, 0, 5), Box("", 2, 2, 5, 5, ignored=True)))]
+    flat = Picture(Path("a.png"), (Box("", 2, 2, 0, 5), Box("", 2, 2, 5, 5, ignored=True)))
     with pytest.raises(LabelError, match="none of the 1 labelled boxes has an area"):
-        choose(pictures, None)
+        choose([flat], None)
 
 
 def test_boxes_without_area_or_outside_are_left_out_with_a_warning() -> None:

@@ -12,6 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from tests.answers import AnswerTo
 from tests.cli.material import LIMO_HOG
 from tests.learn import bollards as drawn
 
@@ -19,8 +20,6 @@ import limo_hog
 from limo_hog.cli.main import main
 from limo_hog.imaging.writing import write_image
 from limo_hog.models import load_model
-
-YARD = "bollards"
 
 
 @pytest.fixture(scope="module")
@@ -41,15 +40,8 @@ def test_opencv_loads_the_detector_and_finds_the_same_rectangles(trained: Path, 
     image = np.asarray(cv2.imread(str(bollards / "0003.png")), np.uint8)
     theirs, ours = cv2.HOGDescriptor(), limo_hog.HOGDescriptor()
     assert theirs.load(str(trained)) and ours.load(str(trained))
-    options: dict[str, Any] = {
-        "hitThreshold": -0.5,
-        "winStride": (8, 8),
-        "padding": (4, 4),
-        "scale": 1.05,
-        "groupThreshold": 0,
-    }
-    expected, weights = theirs.detectMultiScale(image, **options)
-    found, scores = ours.detectMultiScale(image, **options)
+    options: Any = (image, -0.5, (8, 8), (4, 4), 1.05, 0)
+    (expected, weights), (found, scores) = theirs.detectMultiScale(*options), ours.detectMultiScale(*options)
     assert len(expected) > 0
     assert sorted(map(tuple, np.asarray(found).tolist())) == sorted(map(tuple, np.asarray(expected).tolist()))
     assert np.sort(np.ravel(scores)) == pytest.approx(np.sort(np.ravel(weights)), abs=1e-5)
@@ -59,13 +51,10 @@ def test_the_card_says_what_the_detector_is_and_was_made_of(trained: Path, bolla
     card = json.loads(trained.with_name("bollard.yml.json").read_text())
     assert card["window"][0] % 8 == 0
     assert [row["round"] for row in card["rounds"]] == [0, 1]
-    assert card["data"][0]["files"] == 16
-    assert len(card["data"][0]["sha256"]) == 64
-    assert card["figures"]["pictures"] == 3
+    assert (card["data"][0]["files"], len(card["data"][0]["sha256"]), card["figures"]["pictures"]) == (16, 64, 3)
     assert str(bollards.parent) not in json.dumps(card)
     model = load_model(trained)
-    assert model.person_box == tuple(card["person_box"])
-    assert model.threshold == card["threshold"]
+    assert (model.person_box, model.threshold) == (tuple(card["person_box"]), card["threshold"])
     assert model.calibration is not None and model.calibration.slope > 0
     assert sorted(path.name for path in trained.parent.iterdir()) == ["bollard.yml", "bollard.yml.json"]
 
@@ -88,27 +77,25 @@ def test_the_same_command_writes_the_same_bytes(trained: Path, bollards: Path, t
 
 
 @pytest.mark.parametrize(
-    ("arguments", "code", "complaint"),
+    ("typed", "code", "complaint"),
     [
-        (["missing"], 1, "missing: no such file"),
-        (["{crops}"], 1, "there are crops only"),
-        (["{empty}", "--negatives", "{crops}"], 1, "no image or video in this folder"),
-        (["{data}", "--label", "cow"], 1, "no box has the label 'cow'"),
-        (["{data}", "--window", "60x60"], 2, "multiples of 8"),
+        ("missing", 1, "missing: no such file"),
+        ("{crops}", 1, "there are crops only"),
+        ("{empty} --negatives {crops}", 1, "no image or video in this folder"),
+        ("{data} --label cow", 1, "no box has the label 'cow'"),
+        ("{data} --window 60x60", 2, "multiples of 8"),
     ],
 )
 def test_bad_data_is_named_in_one_line_and_nothing_is_written(
-    arguments: list[str], code: int, complaint: str, bollards: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    typed: str, code: int, complaint: str, bollards: Path, tmp_path: Path, answer_to: AnswerTo
 ) -> None:
     write_image(tmp_path / "crops" / "a.png", np.zeros((64, 64), np.uint8))
     (tmp_path / "empty").mkdir()
-    places = {"data": bollards, "crops": tmp_path / "crops", "empty": tmp_path / "empty"}
-    given = [argument.format(**places) for argument in arguments]
-    out = tmp_path / "out" / "model.yml"
-    assert main(["train", *given, "--out", str(out)]) == code
-    (error,) = [line for line in capsys.readouterr().err.splitlines() if "warning:" not in line]
-    assert error.startswith("limo-hog: ") and complaint in error
-    assert not out.exists() and not out.with_name("model.yml.json").exists()
+    given = typed.format(data=bollards, crops=tmp_path / "crops", empty=tmp_path / "empty").split()
+    ended = answer_to("train", *given, "--out", tmp_path / "out" / "model.yml")
+    (error,) = [line for line in ended.err.splitlines() if "warning:" not in line]
+    assert ended.code == code and error.startswith("limo-hog: ") and complaint in error
+    assert [*(tmp_path / "out").glob("*")] == []
 
 
 def test_ctrl_c_keeps_the_last_round(bollards: Path, tmp_path: Path) -> None:
@@ -128,24 +115,17 @@ def test_ctrl_c_keeps_the_last_round(bollards: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_arenas_bollards_are_learnt_and_found_in_pictures_of_unseen_seeds(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_arenas_bollards_are_learnt_and_found_in_unseen_pictures(here: Path, answer_to: AnswerTo) -> None:
     """The commands of docs/training.md."""
-    for name, frames, seed in (("a", "500", "0"), ("b", "150", "1")):
-        command = ["export", "--scenario", YARD, "--out", str(tmp_path / name), "--frames", frames]
-        assert main([*command, "--seed", seed]) == 0
-    model = tmp_path / "bollard.yml"
+    for name, frames, seed in (("a", 500, 0), ("b", 150, 1)):
+        typed = ("export", "--scenario", "bollards", "--out", name, "--frames", frames, "--seed", seed)
+        assert answer_to(*typed).code == 0
     start = time.perf_counter()
-    assert main(["train", str(tmp_path / "a"), "--label", "bollard", "--out", str(model)]) == 0
+    assert answer_to(*"train a --label bollard --out bollard.yml".split()).code == 0
     assert time.perf_counter() - start < 280
-    capsys.readouterr()
-    measure = ["--label", "bollard", "--min-height", "48", "--json", "-"]
-    assert main(["evaluate", str(model), str(tmp_path / "b"), *measure]) == 0
-    assert json.loads(capsys.readouterr().out)["models"][0]["ap"] >= 0.95
+    measured = answer_to(*"evaluate bollard.yml b --label bollard --min-height 48 --json -".split())
+    assert json.loads(measured.out)["models"][0]["ap"] >= 0.95
     # The robot drives to the nearest bollard.
-    follow = ["--controller", "approach", "--detector", f"hog:{model}", "--seconds", "15", "--json", "-"]
-    assert main(["follow", "--scenario", YARD, *follow]) == 0
-    card = json.loads(capsys.readouterr().out)
-    assert card["path_m"] > 0.5
-    assert card["contacts_wall"] == 0
+    typed = ("follow", "--scenario", "bollards", "--controller", "approach", "--detector", "hog:bollard.yml")
+    card = json.loads(answer_to(*typed, "--seconds", 15, "--json", "-").out)
+    assert card["path_m"] > 0.5 and card["contacts_wall"] == 0

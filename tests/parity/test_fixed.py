@@ -140,17 +140,15 @@ def test_detection_takes_paddings_that_are_no_multiple() -> None:
         assert len(hog.detectMultiScale(image, 0, (6, 6), padding)[0]) > 0
 
 
-def test_levels_come_in_order_with_their_own_weights_on_any_number_of_threads() -> None:
-    image, found, grouped, before = noise(300, 300), [], [], limo_hog.get_num_threads()
+def test_levels_come_in_order_with_their_weights_on_any_number_of_threads(threads_put_back: None) -> None:
+    image, found, grouped = noise(300, 300), [], []
     for threads in (1, 2, 3, 16):
         limo_hog.set_num_threads(threads)
         found += [np.column_stack(armed().detectMultiScale(image, -9, groupThreshold=0)) for _ in range(10)]
         grouped.append(np.column_stack(armed().detectMultiScale(image, -9, groupThreshold=1)))
-    limo_hog.set_num_threads(before)
     widths = found[0][(found[0][:, 0] > 0) & (found[0][:, 0] < 150), 2]
     assert len(widths) > 500 and (np.diff(widths) >= 0).all()
-    assert all(np.array_equal(other, found[0]) for other in found)
-    assert all(np.array_equal(other, grouped[0]) for other in grouped)
+    assert all(np.array_equal(other, same[0]) for same in (found, grouped) for other in same)
 
 
 def test_a_wrong_detector_is_refused_before_it_is_taken() -> None:

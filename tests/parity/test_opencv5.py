@@ -17,11 +17,8 @@ SCRIPTS = Path(__file__).with_name("opencv5.py")
 
 def run_scripts(python: Path | str, directory: Path, *more: str) -> str:
     environment = os.environ | {"PYTHONPATH": str(Path(limo_hog.__file__).parents[1])}
-    run = subprocess.run(
-        [python, SCRIPTS, directory, *more], capture_output=True, text=True, env=environment, timeout=120
-    )
-    assert run.returncode == 0, run.stderr
-    return run.stdout
+    command = [python, SCRIPTS, directory, *more]
+    return subprocess.run(command, stdout=subprocess.PIPE, text=True, env=environment, timeout=120, check=True).stdout
 
 
 def test_under_opencv_4_its_own_detector_stays_and_the_scripts_run(tmp_path: Path) -> None:
@@ -37,9 +34,8 @@ def test_under_opencv_5_the_scripts_run_on_limo_hog(tmp_path: Path, wanted: str,
         pytest.skip("needs uv, to make an environment with OpenCV 5")
     python = tmp_path / "venv" / ("Scripts" if os.name == "nt" else "bin") / "python"
     subprocess.run([uv, "venv", "--quiet", "--python", sys.executable, tmp_path / "venv"], check=True, timeout=60)
-    install = subprocess.run(
-        [uv, "pip", "install", "--quiet", "--python", python, wanted], capture_output=True, text=True, timeout=240
-    )
+    command = [uv, "pip", "install", "--quiet", "--python", python, wanted]
+    install = subprocess.run(command, capture_output=True, text=True, timeout=240)
     if install.returncode != 0:
         pytest.skip(f"{wanted} cannot be installed here: {install.stderr.strip().splitlines()[-1:]}")
     assert "OpenCV 5" in run_scripts(python, tmp_path, *more)

@@ -38,11 +38,5 @@ def run(program: str, timeout: float, limits: dict[int, int] | None = None) -> s
         for kind, value in (limits or {}).items():
             resource.setrlimit(kind, (value, value))
 
-    return subprocess.run(
-        [sys.executable, "-c", PRELUDE + textwrap.dedent(program)],
-        capture_output=True,
-        text=True,
-        timeout=timeout,
-        preexec_fn=limit,
-        check=False,
-    )
+    command = [sys.executable, "-c", PRELUDE + textwrap.dedent(program)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=timeout, preexec_fn=limit, check=False)

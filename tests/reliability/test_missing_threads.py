@@ -26,8 +26,7 @@ def test_a_search_finds_the_same_when_no_more_threads_can_be_had() -> None:
     print(len(wanted[0]), all(np.array_equal(a, b) for a, b in zip(found, wanted)))
     """
     done = run(program, 120)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.split()[1:] == ["True"], done.stdout + done.stderr
+    assert (done.returncode, done.stdout.split()[1:]) == (0, ["True"]), done.stdout + done.stderr
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="counts a process's threads as Linux lists them")
@@ -41,20 +40,15 @@ def test_a_search_works_on_no_more_threads_than_there_are_cores() -> None:
     print(names.count("limo-hog") + 1 <= len(os.sched_getaffinity(0)))
     """
     done = run(program, 120)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.split() == ["True"], done.stdout + done.stderr
+    assert (done.returncode, done.stdout.split()) == (0, ["True"]), done.stdout + done.stderr
 
 
-def test_the_number_of_threads_is_what_was_set_and_bounded() -> None:
-    before = limo_hog.get_num_threads()
-    try:
-        limo_hog.set_num_threads(3)
-        assert limo_hog.get_num_threads() == 3
-        for any_number in (0, 10**6):
-            limo_hog.set_num_threads(any_number)
-            assert 1 <= limo_hog.get_num_threads() <= 1024
-    finally:
-        limo_hog.set_num_threads(before)
+def test_the_number_of_threads_is_what_was_set_and_bounded(threads_put_back: None) -> None:
+    limo_hog.set_num_threads(3)
+    assert limo_hog.get_num_threads() == 3
+    for any_number in (0, 10**6):
+        limo_hog.set_num_threads(any_number)
+        assert 1 <= limo_hog.get_num_threads() <= 1024
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -40,28 +43,6 @@ def answer(hog: HOGDescriptor) -> tuple[Any, ...]:
     return tuple(map(tuple, np.asarray(places).tolist())), tuple(np.asarray(weights).tolist())
 
 
-def crowd(workers: list[Any], seconds: float) -> list[BaseException]:
-    """Run the workers again and again, each in a thread of its own; return what they raised."""
-    stop, raised = threading.Event(), []
-
-    def loop(work: Any) -> None:
-        try:
-            while not stop.is_set():
-                work()
-        except BaseException as error:
-            raised.append(error)
-            stop.set()
-
-    threads = [threading.Thread(target=loop, args=(work,)) for work in workers]
-    for thread in threads:
-        thread.start()
-    stop.wait(seconds)
-    stop.set()
-    for thread in threads:
-        thread.join()
-    return raised
-
-
 def test_a_search_during_load_is_of_the_old_detector_or_of_the_new_one(tmp_path: Path) -> None:
     files, answers = [], set()
     for number, geometry in enumerate(GEOMETRIES):
@@ -70,17 +51,17 @@ def test_a_search_during_load_is_of_the_old_detector_or_of_the_new_one(tmp_path:
         hog.save(files[-1])
         answers.add(answer(hog))
     shared = detector(GEOMETRIES[0], 0)
-    mixed = []
 
     def look() -> None:
-        found = answer(shared)
-        if found not in answers:
-            mixed.append(found)
-            raise AssertionError("a mix of two detectors")
+        assert answer(shared) in answers, "a mix of two detectors"
 
-    raised = crowd([look] * 4 + [lambda: shared.load(files[0]), lambda: shared.load(files[1])], 4.0)
-    assert not raised
-    assert not mixed
+    def again_and_again(work: Callable[[], object]) -> None:
+        while time.monotonic() < until:
+            work()
+
+    until, loads = time.monotonic() + 4, [partial(shared.load, file) for file in files]
+    with ThreadPoolExecutor(6) as pool:
+        [*pool.map(again_and_again, [look] * 4 + loads)]
 
 
 def test_coefficients_set_during_load_never_meet_the_geometry_that_was_replaced(tmp_path: Path) -> None:
@@ -92,23 +73,15 @@ def test_coefficients_set_during_load_never_meet_the_geometry_that_was_replaced(
         last = HOGDescriptor(*GEOMETRIES[1])
         last.setSVMDetector(svm)
         wanted.add(answer(last))
-    for _ in range(300):
-        shared = HOGDescriptor(*GEOMETRIES[0])
-        barrier = threading.Barrier(2)
+    barrier = threading.Barrier(2)
 
-        def set_weights(shared: HOGDescriptor = shared, barrier: threading.Barrier = barrier) -> None:
-            barrier.wait()
-            shared.setSVMDetector(weights)
+    def at_once(work: Any, argument: Any) -> None:
+        barrier.wait()
+        work(argument)
 
-        def load(shared: HOGDescriptor = shared, barrier: threading.Barrier = barrier) -> None:
-            barrier.wait()
-            shared.load(tmp_path / "new.yml")
-
-        threads = [threading.Thread(target=set_weights), threading.Thread(target=load)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-        # Whichever came last, the geometry is the file's; the coefficients are of one of the two.
-        assert shared.winSize == GEOMETRIES[1][0]
-        assert answer(shared) in wanted
+    with ThreadPoolExecutor(2) as pool:
+        for _ in range(300):
+            shared = HOGDescriptor(*GEOMETRIES[0])
+            [*pool.map(at_once, (shared.setSVMDetector, shared.load), (weights, tmp_path / "new.yml"))]
+            # Whichever came last, the geometry is the file's; the coefficients are of one of the two.
+            assert shared.winSize == GEOMETRIES[1][0] and answer(shared) in wanted

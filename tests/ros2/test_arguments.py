@@ -59,20 +59,11 @@ WRONG = [
 WRONG += ["--params-file /none.yaml"]
 
 
-@pytest.fixture
-def file(tmp_path: Path) -> Path:
-    path = tmp_path / "parameters.yaml"
-    path.write_text(FILE)
-    return path
-
-
 @pytest.mark.parametrize(("words", "names", "parameters"), CASES)
-def test_names_and_parameters_are_those_of_ros_2(
-    words: str, names: list[str], parameters: dict[str, Any], file: Path
-) -> None:
-    node = parse_ros_arguments(["--ros-args", *words.replace("FILE", str(file)).split()]).named("follower")
-    assert [node.full, *map(node.resolve, TOPICS)] == names
-    assert node.parameters == parameters
+def test_names_and_parameters_are_those_of_ros_2(words: str, names: Any, parameters: Any, here: Path) -> None:
+    (here / "FILE").write_text(FILE)
+    node = parse_ros_arguments(["--ros-args", *words.split()]).named("follower")
+    assert ([node.full, *map(node.resolve, TOPICS)], node.parameters) == (names, parameters)
 
 
 @pytest.mark.parametrize("words", WRONG)
@@ -81,17 +72,16 @@ def test_malformed_arguments_are_refused_and_named(words: str) -> None:
         parse_ros_arguments(["--ros-args", *words.split()])
 
 
+HOSTILE = {
+    "deep lists": (b"n: {ros__parameters: {a: " + 5000 * b"[" + 5000 * b"]" + b"}}", "nested more than 50 deep"),
+    "deep maps": (b"".join(b" " * depth + b"a:\n" for depth in range(2000)), "nested more than 50 deep"),
+    "itself": (b"n: {ros__parameters: &x {a: *x}}", "an alias"),
+    "not UTF-8": (b"n: {ros__parameters: {a: \xe9}}", "cannot be read"),
+}
+
+
 @pytest.mark.timeout(10)
-@pytest.mark.parametrize(
-    ("text", "why"),
-    [
-        (b"n: {ros__parameters: {a: " + 5000 * b"[" + 5000 * b"]" + b"}}", "nested more than 50 deep"),
-        (b"".join(b" " * depth + b"a:\n" for depth in range(2000)), "nested more than 50 deep"),
-        (b"n: {ros__parameters: &x {a: *x}}", "an alias"),
-        (b"n: {ros__parameters: {a: \xe9}}", "cannot be read"),
-    ],
-    ids=["deep lists", "deep maps", "itself", "not UTF-8"],
-)
+@pytest.mark.parametrize(("text", "why"), HOSTILE.values(), ids=HOSTILE)
 def test_a_hostile_parameter_file_is_refused_at_once(text: bytes, why: str, tmp_path: Path) -> None:
     (tmp_path / "p.yaml").write_bytes(text)
     with pytest.raises(RosArgumentError, match=why):
@@ -99,8 +89,9 @@ def test_a_hostile_parameter_file_is_refused_at_once(text: bytes, why: str, tmp_
 
 
 @needs_rclpy
-def test_rclpy_reads_the_same_arguments_alike(file: Path) -> None:
-    told = [words.replace("FILE", str(file)).split() for words in [case[0] for case in CASES] + WRONG]
+def test_rclpy_reads_the_same_arguments_alike(here: Path) -> None:
+    (here / "FILE").write_text(FILE)
+    told = [words.split() for words in [case[0] for case in CASES] + WRONG]
     asked = "".join(json.dumps({"arguments": words, "topics": TOPICS}) + "\n" for words in told)
     said = start(Path(__file__).parent / "rclpy_nodes" / "arguments.py").communicate(asked, timeout=120)[0]
     assert [json.loads(line) for line in said.splitlines()] == [*([n, p] for _, n, p in CASES), *[None] * len(WRONG)]

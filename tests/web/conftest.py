@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import functools
-import http.server
-import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page
 from tests.sim.view.browser import CHROMIUM, chromium
+from tests.threads import served
 
 BUILT = Path(__file__).parents[2] / "target/web"
 
@@ -25,26 +22,6 @@ def built() -> Path:
     if CHROMIUM is None:
         pytest.skip("no Chromium")
     return BUILT
-
-
-class Handler(http.server.SimpleHTTPRequestHandler):
-    """The page's files, in silence."""
-
-    protocol_version = "HTTP/1.1"
-
-    def log_message(self, *_: object) -> None:
-        pass
-
-
-@contextmanager
-def served() -> Iterator[str]:
-    """The page's address while it is served."""
-    handler = functools.partial(Handler, directory=BUILT)
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        server.daemon_threads = True
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        yield f"http://127.0.0.1:{server.server_address[1]}/"
-        server.shutdown()
 
 
 @dataclass
@@ -81,7 +58,7 @@ def opened(browser: Browser | BrowserContext, address: str) -> Lab:
 
 @pytest.fixture(scope="session")
 def address(built: Path) -> Iterator[str]:
-    with served() as address:
+    with served(built) as address:
         yield address
 
 

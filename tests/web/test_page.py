@@ -12,7 +12,8 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Browser
 from tests.sim.view.browser import chromium
-from tests.web.conftest import Lab, opened, served
+from tests.threads import served
+from tests.web.conftest import BUILT, Lab, opened
 
 # Chosen by the tests' own keys; every other control is a form's.
 GRIDS = ["cells", "shares", "hits"]
@@ -184,7 +185,7 @@ def test_a_page_that_may_not_use_the_camera_says_so(own_lab: Lab) -> None:
 
 def test_the_page_works_without_a_network_after_one_visit(browser: Browser) -> None:
     with browser.new_context() as context:
-        with served() as address:
+        with served(BUILT) as address:
             lab = opened(context, address)
             lab.page.evaluate("navigator.serviceWorker.ready")
         for model in ("limo-small", "opencv"):  # one is a file that was not asked for before

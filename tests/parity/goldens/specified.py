@@ -42,11 +42,8 @@ def specified() -> Iterator[Case]:
     yield compute("compute-5arg-ctor", "five arguments: gamma correction is off", seven, geometry=PEOPLE)
     odd: Options = {"winStride": (6, 6), "padding": (5, 7)}
     yield compute("compute-pad-5-7", "padding (5, 7) becomes (6, 8): cache stride 2", eight, **odd)
-    why, cells = (
-        "padding (5, 7) becomes (10, 8), not (6, 12): a bit mask of -6 rounds it",
-        ((12, 12), (6, 6), (6, 6), 9),
-    )
-    yield compute("compute-cell6-pad-nonpow2", why, seven, geometry=((48, 96), *cells), **odd)
+    why = "padding (5, 7) becomes (10, 8), not (6, 12): a bit mask of -6 rounds it"
+    yield compute("compute-cell6-pad-nonpow2", why, seven, geometry=((48, 96), (12, 12), (6, 6), (6, 6), 9), **odd)
     why, tail = "blocks of 63 elements: the normalisation has a scalar tail of 3", ((15, 15), (5, 5), (5, 5), 7)
     yield compute("compute-tail-bins", why, seven, geometry=((60, 60), *tail), winStride=(10, 14))
     why, wide = "blocks of 32 × 16, sigma 6", ((64, 64), (32, 16), (8, 16), (8, 8), 9)
@@ -93,9 +90,6 @@ def specified() -> Iterator[Case]:
     yield search("dms-meanshift", "mean-shift grouping; its threshold is not truncated", astronaut, **daimler | modes)
     own: Options = {"padding": (0, 0), "scale": 1.0, "groupThreshold": 0}
     yield search("dms-scale-1", "the image's own level alone", coffee, **usual | own, hitThreshold=-1.5)
-    why, small = (
-        "an image smaller than the window, made to fit by its padding: one level",
-        partial(images.noise, 13, 100, 50),
-    )
+    why, small = "an image smaller than the window, padded to one level", partial(images.noise, 13, 100, 50)
     yield search("dms-small-padded", why, small, **low, padding=(32, 32), groupThreshold=0)
     yield search("dms-nlevels", "two levels at most", seven, geometry=two_levels, hitThreshold=-9.0, groupThreshold=0)

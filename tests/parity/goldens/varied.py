@@ -17,31 +17,13 @@ from tests.searches import some_search
 Pictures = dict[str, Callable[[], Image]]
 
 #: The image of most cases with people: four sizes, four colours.
-STREET = partial(
-    images.people,
-    2,
-    360,
-    480,
-    [
-        Figure(80, 60, 150, (40, 30, 35), step=6),
-        Figure(200, 90, 200, (20, 60, 120)),
-        Figure(300, 60, 110, (60, 20, 20), step=12),
-        Figure(400, 40, 260, (30, 30, 90), step=12),
-    ],
-)
+FOUR = [Figure(80, 60, 150, (40, 30, 35), step=6), Figure(200, 90, 200, (20, 60, 120))]
+FOUR += [Figure(300, 60, 110, (60, 20, 20), step=12), Figure(400, 40, 260, (30, 30, 90), step=12)]
+STREET = partial(images.people, 2, 360, 480, FOUR)
 #: Two persons who overlap, one cut off by the image's edge, one brighter than the ground; odd sizes.
-CROWD = partial(
-    images.people,
-    5,
-    241,
-    319,
-    [
-        Figure(70, 50, 160, (50, 90, 40)),
-        Figure(112, 60, 150, (90, 40, 110), step=5),
-        Figure(222, 30, 190, (250, 245, 255), step=11),
-        Figure(310, 70, 140, (10, 20, 30)),
-    ],
-)
+CLOSE = [Figure(70, 50, 160, (50, 90, 40)), Figure(112, 60, 150, (90, 40, 110), step=5)]
+CLOSE += [Figure(222, 30, 190, (250, 245, 255), step=11), Figure(310, 70, 140, (10, 20, 30))]
+CROWD = partial(images.people, 5, 241, 319, CLOSE)
 LONELY = partial(images.people, 8, 128, 64, [Figure(32, 16, 96, (40, 30, 35))])
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -29,3 +29,12 @@ def publishing(topic: str, message: Any, hertz: float = 10.0) -> Iterator[None]:
 
     with beside(work):
         yield
+
+
+def until_it_comes(bus: dds.Bus, send: Callable[[], Any], take: Callable[[], Any]) -> Any:
+    """Send again and again, for 10 s at most, until there is something to take: what was taken."""
+    until = time.monotonic() + 10
+    while not (came := take()) and time.monotonic() < until:
+        send()
+        bus.wait(0.1)
+    return came

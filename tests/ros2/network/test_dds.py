@@ -18,9 +18,10 @@ from cyclonedds import builtin
 from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy
 from cyclonedds.topic import Topic
-from tests.ros2.network.publishing import publishing
+from pytest import MonkeyPatch
+from tests.answers import AnswerTo
+from tests.ros2.network.publishing import publishing, until_it_comes
 
-from limo_hog.cli.main import main
 from limo_hog.cli.topic import as_yaml
 from limo_hog.follow.robot import LIMO, RobotGeometry, Twist
 from limo_hog.follow.sense.observation import Scan
@@ -64,20 +65,16 @@ print(len(late), np.percentile(late, 95), stamps[:1], np.unique(np.diff(stamps) 
 """
 
 
-@pytest.mark.parametrize(
-    ("seconds", "hertz", "latest"),
-    [
-        # A receiver that images do not wake is late by up to 2 s; the minute's figure is exact.
-        (3.0, 20.0, 0.5),
-        pytest.param(60.0, 10.0, 0.010, marks=pytest.mark.slow),
-    ],
-)
+# A receiver that images do not wake is late by up to 2 s; the minute's figure is exact.
+MINUTE = pytest.param(60.0, 10.0, 0.010, marks=pytest.mark.slow)
+
+
+@pytest.mark.parametrize(("seconds", "hertz", "latest"), [(3.0, 20.0, 0.5), MINUTE])
 def test_images_reach_another_process_whole_and_in_time(seconds: float, hertz: float, latest: float) -> None:
     count = int(seconds * hertz)
     command = [sys.executable, "-c", RECEIVER, str(seconds + 20), str(count)]
     receiver = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-    assert receiver.stdout is not None
-    assert receiver.stdout.readline() == "ready\n"
+    assert receiver.stdout is not None and receiver.stdout.readline() == "ready\n"
     publisher = dds.Bus().publisher(names.IMAGE, names.TYPES[names.IMAGE])
     while not publisher.has_readers:
         time.sleep(0.01)
@@ -89,8 +86,7 @@ def test_images_reach_another_process_whole_and_in_time(seconds: float, hertz: f
         time.sleep(1 / hertz)
     came, late, *numbers = receiver.communicate(timeout=30)[0].split()
     assert numbers == ["[0]", "[1]"], "the numbers on the images do not run from 0 by 1"
-    assert int(came) == count
-    assert float(late) <= latest
+    assert int(came) == count and float(late) <= latest
 
 
 @pytest.mark.parametrize("publisher_first", [True, False])
@@ -107,12 +103,7 @@ def test_a_driver_that_sends_with_best_effort_is_heard(publisher_first: bool) ->
         listening.topics(10.0, enough=lambda found: names.SCAN in found)
     scans = listening.subscription(names.SCAN, names.TYPES[names.SCAN])
     driver = driver or writer()
-    heard: list[Any] = []
-    until = time.monotonic() + 10
-    while not heard and time.monotonic() < until:
-        driver.write(kind(SCAN))
-        listening.wait(0.1)
-        heard = scans.take()
+    heard = until_it_comes(listening, lambda: driver.write(kind(SCAN)), scans.take)
     assert len(heard[0].ranges) == 292
 
 
@@ -125,38 +116,31 @@ def test_what_is_no_message_is_dropped_and_counted() -> None:
     foreign = messages.serialize(messages.image(0.0, np.zeros((4, 4), np.uint8))).replace(b"depth_link", 10 * b"\xff")
     publisher._type.serialize = lambda *_, **__: foreign
     try:
-        until = time.monotonic() + 10
-        while subscription.dropped == 0 and time.monotonic() < until:
-            publisher._writer.write(sample)
-            bus.wait(0.1)
-            assert subscription.take() == []
+        until_it_comes(
+            bus, lambda: publisher._writer.write(sample), lambda: subscription.take() or subscription.dropped
+        )
     finally:
         dds.dds_type.cache_clear()
-    assert subscription.dropped >= 1
+    assert subscription.dropped >= 1 and subscription.take() == []
 
 
-def test_topic_list_info_and_echo_print_as_ros2_topic_does(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["topic", "list", "-t"]) == 0
-    assert re.fullmatch(r"no topics in .+\n", capsys.readouterr().err)
+def test_topic_list_info_and_echo_print_as_ros2_topic_does(answer_to: AnswerTo) -> None:
+    assert re.fullmatch(r"no topics in .+\n", answer_to("topic", "list", "-t").err)
     with publishing(names.COMMAND, messages.twist(Twist(0.2, 0.0))):
-        assert main(["topic", "list", "-t"]) == 0
-        assert "/cmd_vel [geometry_msgs/msg/Twist]\n" in capsys.readouterr().out
-        assert main(["topic", "info", "/cmd_vel"]) == 0
-        assert capsys.readouterr().out == (
+        assert "/cmd_vel [geometry_msgs/msg/Twist]\n" in answer_to("topic", "list", "-t").out
+        assert answer_to("topic", "info", "/cmd_vel").out == (
             "Type: geometry_msgs/msg/Twist\nPublisher count: 1\n  geometry_msgs/msg/Twist: Reliable, Volatile\n"
             "Subscription count: 0\n"
         )
-        assert main(["topic", "echo", "--once", "/cmd_vel"]) == 0
-    assert capsys.readouterr().out == (
-        "linear:\n  x: 0.2\n  y: 0.0\n  z: 0.0\nangular:\n  x: 0.0\n  y: 0.0\n  z: 0.0\n---\n"
-    )
+        echo = answer_to("topic", "echo", "--once", "/cmd_vel").out
+    assert echo == "linear:\n  x: 0.2\n  y: 0.0\n  z: 0.0\nangular:\n  x: 0.0\n  y: 0.0\n  z: 0.0\n---\n"
 
 
-def test_topic_echo_shows_what_a_publisher_kept(capsys: pytest.CaptureFixture[str]) -> None:
+def test_topic_echo_shows_what_a_publisher_kept(answer_to: AnswerTo) -> None:
     publisher = dds.Bus().publisher(names.TF_STATIC, names.TYPES[names.TF_STATIC], kept=True)
     publisher.publish(frames.static_transforms(0.0, LIMO))
-    assert main(["topic", "echo", "--once", "/tf_static", "--seconds", "10"]) == 0
-    assert "child_frame_id: laser_link" in capsys.readouterr().out
+    shown = answer_to("topic", "echo", "--once", "/tf_static", "--seconds", 10).out
+    assert "child_frame_id: laser_link" in shown
 
 
 def test_the_follower_takes_its_sensors_places_from_tf_static() -> None:
@@ -171,16 +155,15 @@ def test_the_follower_takes_its_sensors_places_from_tf_static() -> None:
     assert line == "camera 0.20 m ahead, 0.25 m high · lidar -0.10 m ahead, turned by 172° (/tf_static)"
 
 
-def test_topic_hz_measures_the_rate(capsys: pytest.CaptureFixture[str]) -> None:
+def test_topic_hz_measures_the_rate(answer_to: AnswerTo) -> None:
     with publishing(names.COMMAND, messages.twist(Twist()), hertz=10.0):
-        assert main(["topic", "hz", "/cmd_vel", "--seconds", "5"]) == 0
-    rate = float(capsys.readouterr().out.split("average rate: ")[-1].split()[0])
-    assert rate == pytest.approx(10.0, abs=0.2)
+        measured = answer_to("topic", "hz", "/cmd_vel", "--seconds", 5).out
+    assert float(measured.split("average rate: ")[-1].split()[0]) == pytest.approx(10.0, abs=0.2)
 
 
-def test_a_topic_that_is_not_there_is_an_error_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["topic", "echo", "/nothing"]) == 1
-    assert "topic /nothing is not there in ROS domain" in capsys.readouterr().err
+def test_a_topic_that_is_not_there_is_an_error_in_one_line(answer_to: AnswerTo) -> None:
+    code, _, err = answer_to("topic", "echo", "/nothing")
+    assert code == 1 and "topic /nothing is not there in ROS domain" in err
 
 
 def test_yaml_is_what_ros_prints_for_numbers_that_are_none_and_long_sequences() -> None:
@@ -191,44 +174,34 @@ def test_yaml_is_what_ros_prints_for_numbers_that_are_none_and_long_sequences() 
     assert "z: 1.0e-05\n" in as_yaml(messages.twist(Twist(0.0, 1e-5)))
 
 
-def test_a_follower_without_a_robot_says_so(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_follower_without_a_robot_says_so(monkeypatch: MonkeyPatch, answer_to: AnswerTo) -> None:
     monkeypatch.setattr(follower, "SILENT_AFTER", 0.3)
-    assert main(["follow", "--ros2", "--seconds", "5"]) == 1
-    said = capsys.readouterr().err
-    assert "no publisher of /limo_camera/image or /limo_camera/image/compressed in ROS domain 10" in said
-    assert "on this machine alone" in said
-    assert "there are no images; topics: " in said
-
-
-def test_a_camera_of_another_name_is_named_and_taken_under_it(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(follower, "SILENT_AFTER", 3.0)
-    with publishing("/robot1/camera/image_raw", BLACK):
-        assert main(["follow", "--ros2", "--seconds", "5"]) == 1
-        said = "images are on /robot1/camera/image_raw: choose one by --ros-args -r limo_camera/image:=TOPIC"
-        assert said in capsys.readouterr().err
-        words = ["-r", "__ns:=/robot1", "-r", "limo_camera/image:=camera/image_raw"]
-        assert main(["follow", "--ros2", "--seconds", "1.5", "--json", "-", "--ros-args", *words]) == 0
-    first, *_, last = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    assert {"seconds", "stamp", "mode", "reason"} == set(first)
-    assert last["frames"] > 0
-
-
-def test_a_parameter_that_is_not_known_is_named_and_one_of_the_wrong_kind_refused(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(follower, "SILENT_AFTER", 0.3)
-    assert main(["follow", "--ros2", "--ros-args", "-p", "base_fame:=x", "-p", "use_sim_time:=true"]) == 1
-    said = capsys.readouterr().err
+    typed = ("follow", "--ros2", "--seconds", 5, "--ros-args", "-p", "base_fame:=x", "-p", "use_sim_time:=true")
+    code, _, said = answer_to(*typed)
+    assert code == 1
+    assert "no publisher of /limo_camera/image or /limo_camera/image/compressed in ROS domain 1" in said
+    assert "on this machine alone" in said and "there are no images; topics: " in said
+    # And which parameter it does not know.
     assert "parameter base_fame is not known; known are base_frame, camera_frame" in said
     assert "use_sim_time" not in said
+
+
+def test_a_camera_of_another_name_is_named_and_taken_under_it(monkeypatch: MonkeyPatch, answer_to: AnswerTo) -> None:
+    monkeypatch.setattr(follower, "SILENT_AFTER", 3.0)
+    rules = "--ros-args -r __ns:=/robot1 -r limo_camera/image:=camera/image_raw".split()
+    with publishing("/robot1/camera/image_raw", BLACK):
+        code, _, err = answer_to("follow", "--ros2", "--seconds", 5)
+        driven = answer_to("follow", "--ros2", "--seconds", 1.5, "--json", "-", *rules)
+    told = "images are on /robot1/camera/image_raw: choose one by --ros-args -r limo_camera/image:=TOPIC"
+    assert code == 1 and told in err
+    first, *_, last = map(json.loads, driven.out.splitlines())
+    assert {"seconds", "stamp", "mode", "reason"} == set(first) and last["frames"] > 0
+
+
+def test_a_parameter_of_the_wrong_kind_is_refused(answer_to: AnswerTo) -> None:
     with publishing(names.IMAGE, BLACK):
-        monkeypatch.setattr(follower, "SILENT_AFTER", 5.0)
-        assert main(["follow", "--ros2", "--seconds", "1", "--ros-args", "-p", "base_frame:=7"]) == 1
-    assert "parameter base_frame is 7; wanted is a frame's name" in capsys.readouterr().err
+        code, _, err = answer_to("follow", "--ros2", "--seconds", 1, "--ros-args", "-p", "base_frame:=7")
+    assert code == 1 and "parameter base_frame is 7; wanted is a frame's name" in err
 
 
 def test_an_arena_names_the_topics_that_another_publishes() -> None:
@@ -239,27 +212,22 @@ def test_an_arena_names_the_topics_that_another_publishes() -> None:
 
 
 @pytest.mark.parametrize("kind", ["compressed", "mono8", "rgb8"])
-def test_the_follower_reads_whatever_pictures_the_camera_sends(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_follower_reads_whatever_pictures_the_camera_sends(kind: str, answer_to: AnswerTo) -> None:
     image = Arena(Scenario.load("standing"), 0).frame().image
     topic, message = names.IMAGE_COMPRESSED, messages.compressed_image(1.0, image)
     if kind != "compressed":
         topic, message = names.IMAGE, messages.image(1.0, image[..., ::-1] if kind == "rgb8" else image[..., 1])
         message.encoding = kind
     with publishing(topic, message):
-        assert main(["follow", "--ros2", "--seconds", "1.5", "--json", "-"]) == 0
-    report = json.loads(capsys.readouterr().out.splitlines()[-1])
-    assert report["frames"] >= 5
-    assert report["found"] == report["frames"]
+        report = json.loads(answer_to("follow", "--ros2", "--seconds", 1.5, "--json", "-").out.splitlines()[-1])
+    assert report["found"] == report["frames"] >= 5
 
 
-def test_a_picture_of_a_kind_that_is_not_read_is_counted_and_the_robot_given_up(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_robot_whose_pictures_cannot_be_read_is_given_up(monkeypatch: MonkeyPatch, answer_to: AnswerTo) -> None:
     monkeypatch.setattr(follower, "SILENT_AFTER", 1.0)
     message = messages.compressed_image(1.0, np.zeros((8, 8, 3), np.uint8))
     message.data = message.data[:20]
     with publishing(names.IMAGE_COMPRESSED, message):
-        assert main(["follow", "--ros2", "--seconds", "5"]) == 1
-    said = capsys.readouterr().err
-    assert "no image on /limo_camera/image/compressed in ROS domain" in said
+        code, _, said = answer_to("follow", "--ros2", "--seconds", 5)
+    assert code == 1 and "no image on /limo_camera/image/compressed in ROS domain" in said
     assert "messages were not read: 20 bytes of 'bgr8; jpeg compressed bgr8' are no picture" in said

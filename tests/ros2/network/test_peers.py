@@ -26,32 +26,25 @@ HERE = Path(__file__).parent / "peer"
 #: Debian's Cyclone DDS is 0.10, which tries addresses for as long as it runs, and does not know the word.
 LOOPBACK_0_10 = LOOPBACK.replace("<InitialLocatorPruneDelay>inf</InitialLocatorPruneDelay>", "")
 
-#: How a peer is built from ros.idl and its source, beside it, and which Debian packages that takes.
+#: Debian packages, and commands with which a peer is built from ros.idl and its source, beside it.
+CYCLONE = "idlc ros.idl", "cc -O1 SOURCE.c ros.c -I. -lddsc -o peer"
+FAST = (
+    "fastddsgen -replace ros.idl",
+    "c++ -O1 -std=c++17 SOURCE.cpp ros.cxx rosPubSubTypes.cxx -I. -lfastrtps -lfastcdr -o peer",
+)
 BUILDS = {
-    "cyclone": (
-        "cyclonedds-tools, cyclonedds-dev and gcc",
-        ["idlc", "ros.idl"],
-        ["cc", "-O1", "SOURCE.c", "ros.c", "-I.", "-lddsc", "-o", "peer"],
-    ),
-    "fast": (
-        "fastddsgen, libfastrtps-dev and g++",
-        ["fastddsgen", "-replace", "ros.idl"],
-        [
-            *("c++", "-O1", "-std=c++17", "SOURCE.cpp", "ros.cxx", "rosPubSubTypes.cxx", "-I."),
-            *("-lfastrtps", "-lfastcdr", "-o", "peer"),
-        ],
-    ),
+    "cyclone": ("cyclonedds-tools, cyclonedds-dev and gcc", CYCLONE),
+    "fast": ("fastddsgen, libfastrtps-dev and g++", FAST),
 }
 
 
 def built(kind: str, folder: Path, source: str) -> Path:
     """Build a peer."""
-    packages, generate, compile_ = BUILDS[kind]
-    if shutil.which(generate[0]) is None or shutil.which(compile_[0]) is None:
-        pytest.skip(f"needs Debian's {packages}")
+    packages, commands = BUILDS[kind]
     shutil.copy(HERE / "ros.idl", folder)
-    compile_ = [word.replace("SOURCE", str(HERE / source)) for word in compile_]
-    for command in (generate, compile_):
+    for command in (command.replace("SOURCE", str(HERE / source)).split() for command in commands):
+        if shutil.which(command[0]) is None:
+            pytest.skip(f"needs Debian's {packages}")
         subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL)
     return folder / "peer"
 
@@ -70,8 +63,7 @@ def exchange(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest
         environment = {**os.environ, "CYCLONEDDS_URI": LOOPBACK_0_10}
         # (It counts periods of 20 ms.)
         other = subprocess.Popen([str(peer), domain, "300"], stdout=subprocess.PIPE, text=True, env=environment)
-        assert other.stdout is not None
-        assert other.stdout.readline() == "ready\n"
+        assert other.stdout is not None and other.stdout.readline() == "ready\n"
         until = time.monotonic() + 5
         while not all(writer.has_readers for writer in writers.values()) and time.monotonic() < until:
             time.sleep(0.01)
@@ -105,14 +97,7 @@ def test_a_peer_receives_what_the_follower_finds_and_its_stamped_commands_arrive
         names.TF: findings.person_frames(12.5, [person], 7),
     }
     said, got = exchange("findings", sent, 5, 10.0, names.STAMPED_COMMAND_TYPE)
-    assert said == [
-        "12.500000000 base_link 2 0 1",
-        "2  person 1.5 42 100 7",
-        "1 7 2 -0.25 0.875",
-        "2 base_link person_7 2",
-    ]
-    headers = {(message.header.stamp.sec, message.header.frame_id) for message in got}
-    assert (headers, {messages.to_twist(message.twist) for message in got}) == (
-        {(12, "base_link")},
-        {Twist(0.5, -0.25)},
-    )
+    pose, found = "12.500000000 base_link 2 0 1", "2  person 1.5 42 100 7"
+    assert said == [pose, found, "1 7 2 -0.25 0.875", "2 base_link person_7 2"]
+    told = {(one.header.stamp.sec, one.header.frame_id, messages.to_twist(one.twist)) for one in got}
+    assert told == {(12, "base_link", Twist(0.5, -0.25))}

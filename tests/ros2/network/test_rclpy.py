@@ -50,10 +50,9 @@ def listened(seconds: float, *words: str, topics: Iterable[str] = RATES) -> dict
     typed = [f"{topic}={names.TYPES[topic].replace('/msg/', '/')}" for topic in topics]
     listener = start(NODES / "listener.py", str(seconds), *typed, *words)
     try:
-        said = json.loads(listener.communicate(timeout=100)[0].splitlines()[-1])
+        said: dict[str, Any] = json.loads(listener.communicate(timeout=100)[0].splitlines()[-1])
     finally:
         listener.kill()
-    assert isinstance(said, dict)
     return said
 
 
@@ -75,8 +74,7 @@ def test_a_stock_reader_hears_every_topic_and_sees_the_node_with_its_topics() ->
         said = heard(4.0)
         if most := said["counts"][names.IMAGE] > 0.5 * said["counts"][names.CAMERA_INFO] > 0:
             break
-    assert most
-    assert said["missing"] == []
+    assert most and said["missing"] == []
     writes, reads = said["nodes"]["/limo_hog_arena"]
     assert writes[names.SCAN] == [names.TYPES[names.SCAN]]
     assert reads == {names.COMMAND: ["geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"]}
@@ -129,8 +127,7 @@ def test_a_stock_reader_gets_nearly_every_raw_image_of_a_machine_at_rest() -> No
 
 def test_the_follower_drives_a_robot_in_a_namespace_with_names_of_its_own(tmp_path: Path) -> None:
     robot = start(NODES / "robot.py", "15", PYTHONPATH=PATH)
-    assert robot.stdout is not None
-    assert robot.stdout.readline() == "ready\n"
+    assert robot.stdout is not None and robot.stdout.readline() == "ready\n"
     log = tmp_path / "log.jsonl"
     rules = "-r limo_camera/image:=camera/color/image_raw -r limo_camera/depth/image_raw:=camera/depth/image_raw"
     rules += " -r scan:=scan_filtered -r odom:=wheels/odom -r cmd_vel:=base/cmd_vel -r __ns:=/robot1"
@@ -144,13 +141,10 @@ def test_the_follower_drives_a_robot_in_a_namespace_with_names_of_its_own(tmp_pa
         robot.kill()
         follower.kill()
     assert "follow: following a person" in error
-    assert said["in_view"] >= 0.95
-    assert said["contacts"] == 0
-    assert said["moved"] > 0.3
+    assert said["in_view"] >= 0.95 and said["contacts"] == 0 and said["moved"] > 0.3
     assert 0.05 < said["fastest"] <= 0.3 + 1e-6
     events = [json.loads(line) for line in log.read_text().splitlines()]
-    assert {"follow"} <= {event.get("mode") for event in events}
-    assert events[-1]["frames"] > 50
+    assert any(event.get("mode") == "follow" for event in events) and events[-1]["frames"] > 50
 
 
 def test_the_example_on_rclpy_follows_and_stops_at_ctrl_c(tmp_path: Path) -> None:

@@ -82,7 +82,6 @@ def some_geometry(draw: Draw, clip: float = 0.2) -> tuple[Any, ...]:
 
 
 def some_stride(draw: Draw) -> Pair | None:
-    """A window stride."""
     return draw.choice((None, None, (8, 8), (4, 4), (16, 8), draw.pair(1, 33), (100, 100)))  # type: ignore[no-any-return]
 
 
@@ -93,8 +92,6 @@ def some_padding(draw: Draw) -> Pair | None:
 
 @dataclass(frozen=True)
 class Search:
-    """One geometry with what is asked of it."""
-
     seed: int
     geometry: tuple[Any, ...]
     size: Pair
@@ -124,7 +121,6 @@ class Search:
 
 
 def some_search(seed: int, clip: float = 0.2) -> Search:
-    """Search number `seed`."""
     draw = Draw(seed)
     geometry = some_geometry(draw, clip)
     win, cell = geometry[0], geometry[3]

@@ -13,8 +13,6 @@ _LINK = re.compile(r"(!?)\[[^\]]*\]\(([^)\s]+)\)")
 
 @dataclass(frozen=True)
 class Page:
-    """A Markdown file."""
-
     path: Path
 
     def __str__(self) -> str:
@@ -26,12 +24,10 @@ class Page:
 
     @property
     def python(self) -> list[str]:
-        """The Python blocks, top to bottom."""
         return [body for language, body in _FENCE.findall(self.text) if language == "python"]
 
     @property
     def links(self) -> list[str]:
-        """Every target of a link or a picture."""
         return [target for _, target in _LINK.findall(_FENCE.sub("", self.text))]
 
     @property

@@ -62,7 +62,6 @@ def in_a_process(first: int, count: int) -> list[list[str]]:
 
 
 def main() -> int:
-    """Run from the command line; 1 where something was found."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--calls", type=lambda text: int(float(text)), default=200_000)
     parser.add_argument("--first", type=int, default=0, help="number of the first call")

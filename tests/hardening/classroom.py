@@ -36,7 +36,6 @@ def grade(folder: Path, exercise: Path) -> dict[str, str]:
 
 
 def main() -> None:
-    """Grade each node alone, then the class, and compare."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=300)
     parser.add_argument("--kinds", type=int, default=60, help="how many different honest nodes")

@@ -67,7 +67,6 @@ class Ride:
         self._frame: Frame | None = None
 
     def until(self, end: float, lost: tuple[str, ...] = ()) -> None:
-        """Drive on until `end` [s] without the senses that are lost."""
         heard = {topic for name, (topic, *_) in TOPICS.items() if name not in lost}
         while self.arena.time < end - 1e-9:
             for topic, make in self._outlet.new(self.arena.passed()):

@@ -94,7 +94,6 @@ LONG = (
 
 
 def material(folder: Path) -> None:
-    """Write what the commands read."""
     for number in range(PICTURES):
         write_image(folder / "in" / f"{number:02d}.png", PICTURE)
     for name in ("a", "café"):
@@ -203,7 +202,6 @@ def _robot() -> Iterator[None]:
 
 
 def _running(mark: str) -> Iterator[int]:
-    """The processes whose environment has a mark."""
     for environ in Path("/proc").glob("[0-9]*/environ"):
         with suppress(OSError):
             if f"{MARK}={mark}\0".encode() in environ.read_bytes():

@@ -152,7 +152,6 @@ def _finding(code: int, told: str) -> str:
 
 
 def _whole(kind: str, folder: Path) -> list[tuple[bytes, bytes]]:
-    """Suffix and bytes of whole pictures or films."""
     for suffix in FILMS if kind == "films" else PICTURES:
         path = folder / f"whole{suffix}"
         if kind != "films":

@@ -63,7 +63,6 @@ def _bollard(canvas: Any, rng: np.random.Generator, x: float, y: float, width: f
 
 
 def write(folder: Path, pictures: int, seed: int) -> None:
-    """Write pictures and their `boxes.json`."""
     folder.mkdir(parents=True, exist_ok=True)
     labels = {}
     for i in range(pictures):

@@ -46,7 +46,6 @@ def lab(browser: Browser, address: str) -> Lab:
 
 @pytest.fixture
 def own_lab(browser: Browser, address: str) -> Iterator[Lab]:
-    """A page for one test."""
     with browser.new_context() as context:
         yield opened(context, address)
 

@@ -24,8 +24,6 @@ DAIMLER = ((48, 96), (16, 16), (8, 8), (8, 8), 9)
 
 @dataclass(frozen=True)
 class Case:
-    """One call of one method on one image."""
-
     name: str
     why: str
     image: Callable[[], Image]

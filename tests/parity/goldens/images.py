@@ -107,7 +107,6 @@ def coverage(figure: Figure, ys: range, xs: range) -> NDArray[np.float64]:
 
 
 def people(seed: int, height: int, width: int, figures: Sequence[Figure]) -> Image:
-    """Draw persons on a ground of coarse and fine noise, in colour."""
     picture = 150.0 + blocks(seed, height, width, size=24)[:, :, None] / 8 + noise(seed + 1, height, width, 3) / 16
     for figure in figures:
         reach = figure.height // 4
@@ -120,5 +119,4 @@ def people(seed: int, height: int, width: int, figures: Sequence[Figure]) -> Ima
 
 
 def gray(image: Image) -> Image:
-    """Keep the middle channel."""
     return np.ascontiguousarray(image[:, :, 1])

@@ -25,7 +25,6 @@ SAMPLES = 12
 
 
 def digest(array: Any) -> str:
-    """MD5 of the values in C order."""
     return hashlib.md5(np.ascontiguousarray(array).tobytes()).hexdigest()
 
 
@@ -58,7 +57,6 @@ def recorded(case: Case) -> dict[str, Any]:
 
 
 def recorded_with(clip: float) -> dict[str, Any]:
-    """Record the cases of one `L2HysThreshold`."""
     import cv2
 
     cv2.setNumThreads(1)  # with more, rectangles come in another order each time

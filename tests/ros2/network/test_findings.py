@@ -47,7 +47,6 @@ MESSAGES = {
 
 
 def cyclone(message: Any) -> Any:
-    """Return a message as Cyclone's own struct."""
     return cyclone_type(message.__msgtype__)(
         **{field.name: as_taken(getattr(message, field.name)) for field in messages.fields_of(message.__msgtype__)}
     )

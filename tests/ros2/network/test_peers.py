@@ -39,7 +39,6 @@ BUILDS = {
 
 
 def built(kind: str, folder: Path, source: str) -> Path:
-    """Build a peer."""
     packages, commands = BUILDS[kind]
     shutil.copy(HERE / "ros.idl", folder)
     for command in (command.replace("SOURCE", str(HERE / source)).split() for command in commands):

@@ -19,7 +19,8 @@ import cv2
 import numpy as np
 import pytest
 from playwright.sync_api import expect
-from pytest import CaptureFixture, MonkeyPatch
+from pytest import MonkeyPatch
+from tests.answers import AnswerTo
 from tests.cli.material import LIMO_HOG, PICTURE, film_of, frames_of, lines_of
 from tests.sim.view.browser import CHROMIUM, chromium
 
@@ -63,8 +64,7 @@ with video_writer(pathlib.Path(sys.argv[1]), fps=25) as write:
 
 
 def test_a_film_is_of_the_same_bytes_whatever_was_in_memory(tmp_path: Path) -> None:
-    for junk in ("1", "200"):
-        # What glibc fills memory with that was never written.
+    for junk in ("1", "200"):  # with which glibc fills memory that was never written
         environment = os.environ | {"MALLOC_PERTURB_": junk}
         subprocess.run([sys.executable, "-c", _WRITTEN, str(tmp_path / junk)], check=True, env=environment)
     assert (tmp_path / "1").read_bytes() == (tmp_path / "200").read_bytes()
@@ -96,8 +96,8 @@ SLOW = pytest.param(7500, marks=[pytest.mark.slow, pytest.mark.timeout(600)])
 
 
 @pytest.mark.parametrize("frames", [75, SLOW])
-def test_a_detector_slower_than_a_camera_gets_its_newest_frame(
-    frames: int, monkeypatch: MonkeyPatch, capsys: CaptureFixture[str]
+def test_a_slow_detector_gets_a_cameras_newest_frame(
+    frames: int, monkeypatch: MonkeyPatch, answer_to: AnswerTo
 ) -> None:
     camera, behind = capture(frames, period_s=0.04), []
 
@@ -108,10 +108,9 @@ def test_a_detector_slower_than_a_camera_gets_its_newest_frame(
 
     monkeypatch.setattr(PeopleDetector, "detect", slow)
     play(monkeypatch, camera)
-    assert main(["detect", "0"]) == 0
-    assert max(behind) <= 2
-    assert len(behind) < frames / 3
-    assert f"{frames - len(behind)} frames dropped" in capsys.readouterr().err
+    code, _, err = answer_to("detect", 0)
+    assert code == 0 and max(behind) <= 2 and len(behind) < frames / 3
+    assert f"{frames - len(behind)} frames dropped" in err
 
 
 @pytest.mark.parametrize(
@@ -122,14 +121,12 @@ def test_a_detector_slower_than_a_camera_gets_its_newest_frame(
     ],
 )
 def test_a_stream_that_breaks_off_is_one_line_and_comes_back_or_fails(
-    then: tuple[int, ...], code: int, said: str, monkeypatch: MonkeyPatch, tmp_path: Path, capsys: CaptureFixture[str]
+    then: tuple[int, ...], code: int, said: str, monkeypatch: MonkeyPatch, tmp_path: Path, answer_to: AnswerTo
 ) -> None:
     play(monkeypatch, *map(capture, (3, *then)))
-    assert main(["detect", "rtsp://camera/live", "--out", str(tmp_path), "--json", "-"]) == code
-    shown = capsys.readouterr()
+    shown = answer_to("detect", "rtsp://camera/live", "--out", tmp_path, "--json", "-")
     numbers = [result["frame"] for result in lines_of(shown.out)]
-    assert numbers == sorted(set(numbers))
-    assert numbers[-1] == 2 + sum(then)
+    assert shown.code == code and numbers == sorted(set(numbers)) and numbers[-1] == 2 + sum(then)
     assert frames_of(tmp_path / "live.mp4") == len(numbers)
     first = "broke off after 3 frames; trying again for 0.07 s"
     told = [line for line in shown.err.splitlines() if "broke off" in line]

@@ -95,7 +95,7 @@ def test_drawing_without_opencv_names_what_to_install(monkeypatch: pytest.Monkey
 def test_detections_are_an_array_of_boxes_and_scores() -> None:
     # The person is two tenths in from the side and one from the top.
     array = np.asarray(some())
-    assert (array.dtype, some().boxes.dtype) == (np.float64, np.int32)
+    assert array.dtype == np.float64 and some().boxes.dtype == np.int32
     assert array.tolist() == [[13, 13, 38, 100, 2.0], [126, 76, 77, 200, 0.5], [30, 30, 60, 156, -1.0]]
     assert some().xyxy.tolist() == [[13, 13, 51, 113], [126, 76, 203, 276], [30, 30, 90, 186]]
 

@@ -206,6 +206,6 @@ def test_backends_find_the_same_and_processes_and_threads_to_the_bit() -> None:
     assert any(wanted) and answers(first, 2) == wanted
     for backend in others:
         for rows in zip(wanted, answers(backend, 1), strict=True):
-            mine, theirs = ([(*box, float.fromhex(str(score))) for *box, score in some] for some in rows)
-            assert [row[:4] for row in mine] == [row[:4] for row in theirs]
+            assert [row[:4] for row in rows[0]] == [row[:4] for row in rows[1]]
+            mine, theirs = ([float.fromhex(str(row[4])) for row in some] for some in rows)
             np.testing.assert_allclose(mine, theirs, atol=1e-4)

@@ -53,7 +53,7 @@ def main() -> None:
             (one / "node.py").write_text(text)
             alone.append(grade(one, exercise)["node.py"])
         folder.mkdir()
-        wanted = {}
+        wanted = dict[str, str]()
         for number in range(count):
             name, one_of_ten = f"s{number:03}.py", number % 10 == 9
             text = hostile[number // 10 % len(hostile)] if one_of_ten else honest[number % len(honest)]

@@ -68,7 +68,7 @@ def test_what_fails_half_way_leaves_the_old_file_and_nothing_else(tmp_path: Path
 class ForeignError(OSError):
     """As PyAV's: its file cannot be set."""
 
-    filename = property(lambda self: self.args[2] if len(self.args) > 2 else None)  # type: ignore[assignment]
+    filename = property(lambda self: self.args[2] if len(self.args) > 2 else None)
 
 
 @pytest.mark.parametrize("kind", [OSError, ForeignError])

@@ -77,7 +77,7 @@ def slow_lamr(found: Found, labelled: Labelled) -> float:
         for rows, (_, scores), (_, ignored) in zip(overlaps, found, labelled, strict=True):
             taken: set[int] = set()
             for row in rows[scores >= threshold]:
-                near = [(row[i], i) for i in np.flatnonzero(~ignored) if i not in taken and row[i] >= 0.5]
+                near = [(row[i], i) for i in np.flatnonzero(~ignored).tolist() if i not in taken and row[i] >= 0.5]
                 taken |= {max(near)[1]} if near else set()
                 right += bool(near)
                 wrong += not near and not (row[ignored] >= 0.5).any()

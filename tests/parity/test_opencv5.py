@@ -17,7 +17,7 @@ SCRIPTS = Path(__file__).with_name("opencv5.py")
 
 def run_scripts(python: Path | str, directory: Path, *more: str) -> str:
     environment = os.environ | {"PYTHONPATH": str(Path(limo_hog.__file__).parents[1])}
-    command = [python, SCRIPTS, directory, *more]
+    command = [str(python), str(SCRIPTS), str(directory), *more]
     return subprocess.run(command, stdout=subprocess.PIPE, text=True, env=environment, timeout=120, check=True).stdout
 
 

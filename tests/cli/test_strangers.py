@@ -288,10 +288,3 @@ def test_pictures_are_searched_while_python_ends(tmp_path: Path) -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=60)
     assert int(done.stdout) >= 8 and not done.stderr
-
-
-def test_what_cannot_be_written_is_told_before_the_work(tmp_path: Path, answer_to: AnswerTo) -> None:
-    (tmp_path / "file").write_text("")
-    for option in ("--json", "--csv"):
-        target = tmp_path / "file" / "a.csv"
-        assert answer_to("score", option, target) == (1, "", f"limo-hog: {target}: Not a directory\n")

@@ -86,11 +86,15 @@ def test_an_error_of_another_file_keeps_its_name(tmp_path: Path) -> None:
     assert caught.value.filename == str(tmp_path / "other.json")
 
 
-def test_a_folder_is_no_file_to_write(tmp_path: Path) -> None:
+def test_a_folder_and_a_name_that_is_too_long_are_no_files_to_write(tmp_path: Path) -> None:
     for folder in (tmp_path, Path(), Path("/"), Path("..")):
         with pytest.raises(IsADirectoryError) as caught, whole_file(folder):
             pass
         assert caught.value.filename == str(folder)
+    too_long = tmp_path / f"{'a' * 256}.csv"
+    with pytest.raises(OSError, match="File name too long") as named:
+        write_text(too_long, "")
+    assert named.value.filename == str(too_long)
 
 
 def test_what_is_written_to_a_pipe_comes_out_of_it_and_it_stays_a_pipe(tmp_path: Path) -> None:
@@ -125,13 +129,6 @@ def test_a_name_as_long_as_a_file_system_allows_can_be_written(letter: str, tmp_
             assert path.read_text() == path.name
         assert part_of(first) != part_of(other)
     assert len(list(tmp_path.iterdir())) == 4
-
-
-def test_a_name_that_is_too_long_is_the_one_that_the_error_tells(tmp_path: Path) -> None:
-    path = tmp_path / f"{'a' * 256}.csv"
-    with pytest.raises(OSError, match="File name too long") as caught:
-        write_text(path, "")
-    assert caught.value.filename == str(path)
 
 
 @pytest.mark.parametrize(("width", "height"), [(64, 48), (63, 47)])

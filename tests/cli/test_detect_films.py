@@ -96,9 +96,7 @@ SLOW = pytest.param(7500, marks=[pytest.mark.slow, pytest.mark.timeout(600)])
 
 
 @pytest.mark.parametrize("frames", [75, SLOW])
-def test_a_slow_detector_gets_a_cameras_newest_frame(
-    frames: int, monkeypatch: MonkeyPatch, answer_to: AnswerTo
-) -> None:
+def test_a_slow_detector_gets_the_newest_frame(frames: int, monkeypatch: MonkeyPatch, answer_to: AnswerTo) -> None:
     camera, behind = capture(frames, period_s=0.04), []
 
     def slow(_: PeopleDetector, image: np.ndarray[Any, Any]) -> Detections:

@@ -53,9 +53,8 @@ def test_copies_and_lines_that_are_there_are_not_made_again(pictures: Path, tmp_
     # Lines that a killed run lacks are added, and the film's copy stays.
     file.write_text("".join(before.splitlines(keepends=True)[:8]))
     assert main(arguments) == 0
-    assert [(r["source"], r["frame"]) for r in lines_of(file.read_text())] == [
-        (r["source"], r["frame"]) for r in lines_of(before)
-    ]
+    now, then = ([(r["source"], r["frame"]) for r in lines_of(text)] for text in (file.read_text(), before))
+    assert now == then
     assert (out / "film.mp4").stat().st_mtime_ns == made[out / "film.mp4"]
 
 
@@ -119,7 +118,7 @@ WRONG: list[tuple[str, object]] = [
 ]
 
 
-def test_a_line_with_a_value_of_another_kind_is_not_gone_on_from(
+def test_a_line_with_values_of_another_kind_is_not_gone_on_from(
     pictures: Path, here: Path, answer_to: AnswerTo
 ) -> None:
     arguments = ("detect", pictures / "a.png", "--json", "found.json", "--csv", "found.csv")

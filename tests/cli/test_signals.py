@@ -57,19 +57,15 @@ def test_the_signals_of_one_closing_terminal_do_not_interrupt_the_closing(monkey
     assert closed == ["whole"]
 
 
-def test_an_ignored_signal_stays_ignored() -> None:
-    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    try:
-        with stopping():
-            signal.raise_signal(signal.SIGHUP)
-    finally:
-        signal.signal(signal.SIGHUP, before)
-
-
-def test_a_thread_may_run_a_command() -> None:
+def test_an_ignored_signal_stays_ignored_and_a_thread_may_run_a_command() -> None:
     def run() -> str:
         with stopping(), held():
+            signal.raise_signal(signal.SIGHUP)
             return "run"
 
-    with ThreadPoolExecutor(1) as pool:
-        assert pool.submit(run).result() == "run"
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with ThreadPoolExecutor(1) as pool:
+            assert [run(), pool.submit(run).result()] == ["run", "run"]
+    finally:
+        signal.signal(signal.SIGHUP, before)

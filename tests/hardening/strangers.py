@@ -129,14 +129,12 @@ def _answer(arguments: list[str], folder: Path) -> tuple[int, str]:
 
 def _import_what_it_needs(arguments: list[str], folder: Path) -> None:
     """Import all that a command imports, so that its forks need not; refuse a command that fails on whole input."""
-    code = (
-        "import sys; from limo_hog.cli.main import main; code = main(); print(*sys.modules, sep='\\n'); sys.exit(code)"
-    )
+    code = "import sys; from limo_hog.cli.main import main; code = main(); print(*sys.modules); sys.exit(code)"
     command = [sys.executable, "-c", code, *arguments]
     done = subprocess.run(command, check=False, capture_output=True, text=True, cwd=folder)
     if done.returncode:
         raise RuntimeError(f"a whole file is refused, so that nothing is tried: {done.stderr}")
-    for name in done.stdout.splitlines():
+    for name in done.stdout.splitlines()[-1].split():
         with suppress(Exception):
             if name.partition(".")[0] in LIBRARIES:
                 importlib.import_module(name)

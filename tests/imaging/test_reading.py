@@ -58,7 +58,7 @@ def test_an_image_is_read_as_opencv_reads_it(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "said"), [(b"", "the file is empty"), (b"hello", "not an image that OpenCV can read")]
+    ("content", "said"), [(b"", "the file is empty"), (b"hi", "not an image that OpenCV can read")]
 )
 def test_a_file_that_is_no_image_is_named(content: bytes, said: str, tmp_path: Path) -> None:
     path = tmp_path / "bad.jpg"

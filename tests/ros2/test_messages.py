@@ -149,9 +149,7 @@ def test_stamps_round_to_the_nearest_nanosecond() -> None:
 
 def test_every_message_has_the_hash_ros_2_jazzy_gives_it() -> None:
     # from the .json files of ROS 2 Jazzy's packages
-    string, twist = (
-        messages.typestore().hash_rihs01(name) for name in ("std_msgs/msg/String", "geometry_msgs/msg/Twist")
-    )
+    string, twist = map(messages.typestore().hash_rihs01, ("std_msgs/msg/String", "geometry_msgs/msg/Twist"))
     assert string == "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
     assert twist == "RIHS01_9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a"
 

@@ -72,14 +72,11 @@ def opencv_answers() -> dict[str, Any]:
     return plain
 
 
-def write(answers: dict[str, Any]) -> None:
-    lines = [f"{json.dumps(name)}: {json.dumps(answer, separators=(',', ':'))}" for name, answer in answers.items()]
-    ANSWERS.write_text("{\n" + ",\n".join(lines) + "\n}\n")
-
-
 if __name__ == "__main__":
     import cv2
 
     if not cv2.__version__.startswith("4.14."):
         sys.exit(f"OpenCV is {cv2.__version__}, but the answers are those of 4.14: install opencv-python-headless 4.14")
-    write(opencv_answers())
+    told = opencv_answers().items()
+    lines = [f"{json.dumps(name)}: {json.dumps(answer, separators=(',', ':'))}" for name, answer in told]
+    ANSWERS.write_text("{\n" + ",\n".join(lines) + "\n}\n")

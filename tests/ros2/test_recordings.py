@@ -139,9 +139,6 @@ def test_damaged_recordings_end_named_or_fine(seeds: range, recording: bytes, tm
     assert {"BagError", "3 frames"} <= outcomes
 
 
-# Damage on purpose.
-
-
 def _record(opcode: int, data: bytes) -> bytes:
     return struct.pack("<BQ", opcode, len(data)) + data
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page
-from tests.sim.view.browser import CHROMIUM, chromium
+from tests.sim.view.browser import CHROMIUM
 from tests.threads import served
 
 BUILT = Path(__file__).parents[2] / "target/web"
@@ -55,10 +55,3 @@ def opened(browser: Browser | BrowserContext, address: str) -> Lab:
 def address(built: Path) -> Iterator[str]:
     with served(built) as address:
         yield address
-
-
-@pytest.fixture(scope="module")
-def browser(built: Path, request: pytest.FixtureRequest) -> Iterator[Browser]:
-    """A browser; a module may name its flags in `FLAGS`."""
-    with chromium(*getattr(request.module, "FLAGS", ())) as browser:
-        yield browser

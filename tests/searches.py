@@ -1,7 +1,5 @@
 """Random searches for the sweep, the goldens and the random calls: each is made of its number alone."""
 
-from __future__ import annotations
-
 import math
 import random
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Follow-Bench's files become our scenes at half their size, and its oracles follow the first person."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -37,8 +35,7 @@ def scene(tmp_path: Path) -> Scenario:
 
 def test_lengths_and_speeds_are_halved_about_the_middle(scene: Scenario) -> None:
     target, *others = scene.people
-    assert scene.room.half == 10.0
-    assert target.route == ((-5.0, 0.0, 0.0), (5.0, 0.0, 0.0))
+    assert scene.room.half == 10.0 and target.route == ((-5.0, 0.0, 0.0), (5.0, 0.0, 0.0))
     assert [person.speed for person in scene.people] == [0.75, 0.5, 0.75, 0.75]
     assert (scene.robot.x, scene.robot.y, scene.robot.yaw) == (-5.0 - BEHIND, 0.0, 0.0)
     assert all(person.yields for person in others)

@@ -1,7 +1,5 @@
 """`limo-hog completion` prints a script with which a shell completes commands, options and values."""
 
-from __future__ import annotations
-
 import subprocess
 
 import pytest

@@ -1,7 +1,5 @@
 """What `detect` writes is whole, replaced only when asked, and gone on from."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os
@@ -146,22 +144,18 @@ def test_ctrl_c_keeps_what_is_done(tmp_path: Path) -> None:
         time.sleep(0.02)
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=30)
-    assert process.returncode == 130
-    assert said.splitlines()[-1] == "limo-hog: stopped"
+    assert process.returncode == 130 and said.splitlines()[-1] == "limo-hog: stopped"
     assert "Traceback" not in said
     frames = [r["frame"] for r in lines_of(file.read_text())]
-    assert frames == list(range(len(frames)))
-    assert 0 < len(frames) < 2000
-    assert list(out.iterdir()) == []
-    assert not part.exists()
+    assert frames == list(range(len(frames))) and 0 < len(frames) < 2000
+    assert list(out.iterdir()) == [] and not part.exists()
 
 
 def test_a_full_disk_is_one_line_and_leaves_nothing_half_written(pictures: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     typed = ["detect", str(pictures), "--out", str(out), "--json", str(out / "o.json")]
     done = on_a_full_disk(64_000, *typed)
-    assert done.returncode == 1
-    assert os.strerror(errno.EFBIG) in done.stderr and "Traceback" not in done.stderr
+    assert done.returncode == 1 and os.strerror(errno.EFBIG) in done.stderr and "Traceback" not in done.stderr
     for path in out.rglob("*.png"):
         assert cv2.imread(str(path)) is not None
     assert lines_of((out / "o.json").read_text()) is not None

@@ -1,7 +1,5 @@
 """`limo-hog info` shows versions, hardware and extras."""
 
-from __future__ import annotations
-
 import importlib.metadata
 
 import cv2
@@ -11,7 +9,7 @@ from tests.answers import AnswerTo
 
 def test_info_names_versions_hardware_and_extras(answer_to: AnswerTo, monkeypatch: pytest.MonkeyPatch) -> None:
     real_version, lacking = importlib.metadata.version, {"av": "not-there", "limo-sim": "not-there"}
-    monkeypatch.setattr("limo_hog.cli.support.environment.version", lambda name: real_version(lacking.get(name, name)))
+    monkeypatch.setattr("limo_hog.cli.support.environment.version", lambda one: real_version(lacking.get(one) or one))
     shown = " ".join(answer_to("info").out.split())
     wanted = ["limo-hog", "backend", "CPU features", "threads", f"{cv2.__version__} (with HOGDescriptor)"]
     wanted += [f"{extra} not installed: pip install 'limo-hog[{extra}]'" for extra in ("video", "sim")]

@@ -1,7 +1,5 @@
 """`limo-hog` routes to commands, answers errors in one line and with an exit code."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Names, files, pipes and terminals of others: a command names what it cannot use, does the rest, and ends."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

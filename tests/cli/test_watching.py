@@ -1,7 +1,5 @@
 """What `follow` keeps of a run is whole, readable by others, and gives the same detections again."""
 
-from __future__ import annotations
-
 import asyncio
 import errno
 import json
@@ -210,8 +208,7 @@ def test_a_closed_terminal_does_not_stop_what_nohup_started(tmp_path: Path) -> N
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     time.sleep(1.5)
     process.send_signal(signal.SIGHUP)
-    assert process.wait(60) == 0
-    assert (tmp_path / "card.json").exists()
+    assert process.wait(60) == 0 and (tmp_path / "card.json").exists()
 
 
 def test_pages_that_do_not_read_hold_no_score_card_up(tmp_path: Path) -> None:

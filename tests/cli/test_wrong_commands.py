@@ -1,7 +1,5 @@
 """Wrong command lines: each is answered at once, by one line that says what is wrong and what is wanted."""
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

@@ -1,7 +1,5 @@
 """What HOGDescriptor offers beyond OpenCV's, and its errors for wrong arguments."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Files that are no model, hostile ones too, are refused soon by a named error, and change nothing."""
 
-from __future__ import annotations
-
 import gzip
 import time
 from pathlib import Path

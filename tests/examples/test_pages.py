@@ -1,7 +1,5 @@
 """README and docs: links lead somewhere, every page can be reached, Python blocks are Python and import what exists."""
 
-from __future__ import annotations
-
 import ast
 import importlib
 import re

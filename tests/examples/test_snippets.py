@@ -1,7 +1,5 @@
 """The Python blocks of both READMEs and of docs/coming-from.md run, and do what the pages say."""
 
-from __future__ import annotations
-
 from itertools import islice
 from pathlib import Path
 from typing import Any

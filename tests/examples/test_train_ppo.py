@@ -1,7 +1,5 @@
 """The example that learns to follow writes a policy that drives."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

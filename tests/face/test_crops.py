@@ -1,7 +1,5 @@
 """Descriptors of many crops: those of `HOGDescriptor.compute`, within 1e-6."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Detections are indexed, drawn, and told as probabilities."""
 
-from __future__ import annotations
-
 import json
 import sys
 from dataclasses import replace
@@ -81,8 +79,7 @@ def test_the_people_are_drawn_into_a_copy() -> None:
         image = np.full(shape, 128, np.uint8)
         drawn = some().draw(image)
         assert drawn.shape == (480, 640, 3)
-        assert (image == 128).all() and (drawn[300:, 300:] == 128).all()
-        assert (drawn[76 + 100, 126] != 128).any()
+        assert (image == 128).all() and (drawn[300:, 300:] == 128).all() and (drawn[76 + 100, 126] != 128).any()
 
 
 def test_drawing_without_opencv_names_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -165,8 +162,7 @@ def test_another_detectors_boxes_are_their_own_windows_best_first() -> None:
     supervision = pytest.importorskip("supervision", reason="needs supervision")
     xyxy = np.array([[1, 2, 11, 22], [5, 6, 25, 46]], np.float32)
     found = Detections.from_supervision(supervision.Detections(xyxy, confidence=np.array([0.2, 0.9])))
-    assert found.boxes.tolist() == [[5, 6, 20, 40], [1, 2, 10, 20]]
-    assert found.scores.tolist() == [0.9, 0.2]
+    assert found.boxes.tolist() == [[5, 6, 20, 40], [1, 2, 10, 20]] and found.scores.tolist() == [0.9, 0.2]
     with pytest.raises(HogError, match=r"no confidence; give each box one"):
         Detections.from_supervision(supervision.Detections(xyxy))
 

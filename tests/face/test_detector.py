@@ -1,7 +1,5 @@
 """PeopleDetector: its arguments, the boxes it gives, and their agreement with OpenCV where it asks for OpenCV's."""
 
-from __future__ import annotations
-
 import copy
 import json
 import pickle
@@ -53,8 +51,7 @@ def test_grouped_and_at_the_images_own_size_the_boxes_are_opencvs(model: str) ->
     for image in (picture(), street(800, 600, 1)):
         theirs = np.reshape(hog.detectMultiScale(image, padding=(4, 4))[0], (-1, 4)).tolist()
         both.append((sorted(detector.detect(image).windows.tolist()), sorted(theirs)))
-    assert any(ours for ours, _ in both)
-    assert all(ours == theirs for ours, theirs in both)
+    assert any(ours for ours, _ in both) and all(ours == theirs for ours, theirs in both)
 
 
 def test_people_of_the_height_asked_for_are_found() -> None:
@@ -139,8 +136,7 @@ def test_the_limit_of_overlap_can_be_chosen() -> None:
     assert 0 < few < some < many
     # A threshold below -1 gives more, the surest first.
     fewer, more = (PeopleDetector(threshold=t, second_look=False).detect(picture()) for t in (None, -1.2))
-    assert len(more) > len(fewer) and -1.2 <= more.scores.min() < 0
-    assert (np.diff(more.scores) <= 0).all()
+    assert len(more) > len(fewer) and -1.2 <= more.scores.min() < 0 and (np.diff(more.scores) <= 0).all()
 
 
 def test_a_detector_cannot_be_changed() -> None:
@@ -173,8 +169,7 @@ def test_on_photographs_a_guided_search_misses_few_hits_and_adds_none() -> None:
             every, some = ({*map(tuple, one.detect(file).windows.tolist())} for one in (exact, guided))
             assert some <= every
             hits, misses = hits + len(every), misses + len(every - some)
-    assert misses < 0.03 * hits
-    assert hits > 100
+    assert misses < 0.03 * hits and hits > 100
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])

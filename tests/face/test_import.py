@@ -1,7 +1,5 @@
 """What `import limo_hog` brings along, and what it leaves to later imports."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

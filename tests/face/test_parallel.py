@@ -1,7 +1,5 @@
 """Work on several threads gives results in order, holds few of them, and stops when it should."""
 
-from __future__ import annotations
-
 import random
 import threading
 import time

@@ -1,7 +1,5 @@
 """The detector's second look: a small network's answers, against the same in plain numpy."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -6,8 +6,6 @@ what it found to FILE; started again, it goes on where it stopped. `--only N` ma
 `tests/parity/test_sweep.py` puts calls with ordinary arguments to OpenCV, too.
 """
 
-from __future__ import annotations
-
 import argparse
 import faulthandler
 import json

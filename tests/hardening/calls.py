@@ -1,7 +1,5 @@
 """What the random calls are made of: arguments, each kind of call, and what is wanted of its answer."""
 
-from __future__ import annotations
-
 import copy
 import math
 import pickle

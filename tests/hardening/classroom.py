@@ -3,8 +3,6 @@
 `python -m tests.hardening.classroom --count 300` (half an hour on two cores).
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 import subprocess

@@ -3,8 +3,6 @@
 `python -m tests.hardening.files models cdr scenarios --count 10000`; recordings are in tests/ros2/test_recordings.py.
 """
 
-from __future__ import annotations
-
 import random
 import struct
 import sys

@@ -5,8 +5,6 @@ the start or lost after 5 s, and each topic's clock wrong before another sense d
 needs a quarter of an hour.
 """
 
-from __future__ import annotations
-
 import argparse
 import itertools
 import json

@@ -4,8 +4,6 @@
 terminal; nothing of a killed command runs on, no broken file has its name, and `--resume` completes.
 """
 
-from __future__ import annotations
-
 import csv
 import json
 import os

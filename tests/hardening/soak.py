@@ -9,8 +9,6 @@ A reading is of the memory that is a process's own, after the C library has give
 that are on their way just then, so of each minute the lowest counts: the slope is of a straight line through these.
 """
 
-from __future__ import annotations
-
 import argparse
 import asyncio
 import ctypes

@@ -4,8 +4,6 @@
 command runs in a fork of a process that has imported what it needs: a thousand of a kind take a minute or two.
 """
 
-from __future__ import annotations
-
 import importlib
 import json
 import os

@@ -1,7 +1,5 @@
 """The detector takes names of files and PIL images, and finds in them what OpenCV's reading of them holds."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

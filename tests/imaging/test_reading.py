@@ -1,7 +1,5 @@
 """Inputs become pictures; an input that is none is an error of one line."""
 
-from __future__ import annotations
-
 import io
 import sys
 from collections.abc import Iterator
@@ -30,8 +28,7 @@ def test_a_file_whose_name_looks_like_a_glob_or_a_number_is_that_file(here: Path
     for name in ("[1].png", "0"):
         (here / name).write_bytes(b"")
     assert [s.path for s in find_sources("[1].png")] == [Path("[1].png")]
-    assert find_sources("0")[0].kind is Kind.IMAGE
-    assert find_sources("7")[0].kind is Kind.CAMERA
+    assert find_sources("0")[0].kind is Kind.IMAGE and find_sources("7")[0].kind is Kind.CAMERA
 
 
 @pytest.mark.parametrize(
@@ -85,8 +82,7 @@ def test_a_video_gives_every_nth_frame_that_is_not_done_yet(tmp_path: Path) -> N
     _film(tmp_path / "film.mp4")
     with open_video(find_sources(str(tmp_path / "film.mp4"))[0]) as video:
         frames = dict(video.frames(every=5, skip={5}))
-    assert (video.fps, video.frame_count) == (10.0, 20)
-    assert list(frames) == [0, 10, 15]
+    assert (video.fps, video.frame_count) == (10.0, 20) and list(frames) == [0, 10, 15]
     assert abs(float(frames[10].mean()) - 100) < 5
 
 

@@ -1,7 +1,5 @@
 """Files appear under their name whole or not at all."""
 
-from __future__ import annotations
-
 import errno
 import os
 import stat
@@ -61,8 +59,7 @@ def test_what_fails_half_way_leaves_the_old_file_and_nothing_else(tmp_path: Path
     with pytest.raises(KeyboardInterrupt), whole_file(path) as part:
         part.write_text("half")
         raise KeyboardInterrupt
-    assert path.read_text() == "old"
-    assert list(tmp_path.iterdir()) == [path]
+    assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
 
 
 class ForeignError(OSError):

@@ -1,7 +1,5 @@
 """Small labelled pictures of bollards, to train on in a few seconds."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

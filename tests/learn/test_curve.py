@@ -1,7 +1,5 @@
 """The figures of a detector agree with COCO's evaluation and with their definitions, computed slowly."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import math
@@ -111,8 +109,7 @@ def test_a_box_is_found_once_and_by_the_surest() -> None:
     boxes = np.array([[0, 0, 10, 20], [100, 0, 10, 20]], np.float64)
     hits = np.array([[0, 0, 10, 22], [0, 0, 10, 20], [50, 50, 10, 20]], np.float64)
     pairs = match(hits, boxes, np.zeros(2, np.bool_))
-    assert pairs.detections.tolist() == [0, -1, -1]
-    assert pairs.boxes.tolist() == [0, -1]
+    assert pairs.detections.tolist() == [0, -1, -1] and pairs.boxes.tolist() == [0, -1]
 
 
 def test_what_lies_in_an_ignored_box_is_neither_right_nor_wrong() -> None:
@@ -121,8 +118,7 @@ def test_what_lies_in_an_ignored_box_is_neither_right_nor_wrong() -> None:
     pairs = match(hits, boxes, np.ones(1, np.bool_))
     assert pairs.detections.tolist() == [-2, -1]
     outcomes, _ = collect([(hits, np.array([2.0, 1.0]))], [(boxes, np.ones(1, np.bool_))])
-    assert outcomes.objects.tolist() == [0]
-    assert outcomes.right.tolist() == [False]
+    assert outcomes.objects.tolist() == [0] and outcomes.right.tolist() == [False]
 
 
 def test_whoever_finds_everyone_has_no_miss_rate_and_whoever_finds_nobody_has_all() -> None:
@@ -133,8 +129,7 @@ def test_whoever_finds_everyone_has_no_miss_rate_and_whoever_finds_nobody_has_al
     worst, _ = collect([nothing] * 4, plain)
     assert figures(best)._asdict() == {"lamr": pytest.approx(1e-10), "recall_01": 1, "recall_1": 1, "ap": 1}
     assert figures(worst) == (1, 0, 0, 0)
-    assert curve(worst).recall.tolist() == []
-    assert threshold_at(curve(worst), 0.1) == math.inf
+    assert curve(worst).recall.tolist() == [] and threshold_at(curve(worst), 0.1) == math.inf
 
 
 def test_the_threshold_at_an_fppi_gives_that_many_false_alarms() -> None:

@@ -1,7 +1,5 @@
 """Label files of every kind give the same boxes, and what is wrong with one is told in one line."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

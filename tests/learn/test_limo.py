@@ -1,7 +1,5 @@
 """Our own weights: two windows, each for its sizes, whose margins mean the same."""
 
-from __future__ import annotations
-
 import json
 from functools import partial
 from importlib.resources import files
@@ -61,8 +59,7 @@ def test_from_64_px_on_and_in_opencvs_grouping_the_large_window_alone_is_used(op
 def test_people_of_48_px_are_found() -> None:
     picture = people_of(52)
     found = PeopleDetector(model="limo", min_height=48).detect(picture)
-    assert 46 <= found.boxes[:, 3].min() < 62
-    assert (np.diff(found.scores) <= 0).all()
+    assert 46 <= found.boxes[:, 3].min() < 62 and (np.diff(found.scores) <= 0).all()
 
 
 def test_the_cards_say_where_the_weights_come_from() -> None:

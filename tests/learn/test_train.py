@@ -1,7 +1,5 @@
 """`limo-hog train` makes a detector that OpenCV loads, and leaves nothing half-written."""
 
-from __future__ import annotations
-
 import json
 import signal
 import subprocess

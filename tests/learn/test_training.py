@@ -1,7 +1,5 @@
 """Training: rounds, and that the same data give the same detector."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -94,8 +92,7 @@ def test_memory_is_bounded_by_leaving_out_the_least_hard_negatives(data: Trainin
     first, free = _train(data, replace(SMALL, rounds=1))
     room = first.descriptor_bytes + 10 * 4 * (len(first.solution.coefficients) - 1)
     _, bounded = _train(data, replace(SMALL, rounds=1, most_bytes=room))
-    assert (bounded.new, bounded.left_out) == (10, free.new - 10)
-    assert bounded.descriptor_bytes <= room
+    assert (bounded.new, bounded.left_out) == (10, free.new - 10) and bounded.descriptor_bytes <= room
     found = list(Miner(data.negatives, data.shape, SMALL.mining, 0, 2).hard(first.solution.coefficients, {}))
     kept, left_out = hardest(found, 10 * found[0].descriptors[0].nbytes)
     margins = np.sort(np.concatenate([mined.margins for mined in found]))
@@ -155,8 +152,7 @@ def test_probabilities_are_those_the_scores_were_drawn_from() -> None:
     likely = 1 / (1 + np.exp(-(3 * scores - 1)))
     right = rng.random(20_000) < likely
     assert (np.abs(np.subtract(calibrate(scores, right), (3, -1))) <= (0.15, 0.08)).all()
-    assert calibration_error(likely, right) < 0.01
-    assert calibration_error(np.full(20_000, 0.9), right) > 0.3
+    assert calibration_error(likely, right) < 0.01 and calibration_error(np.full(20_000, 0.9), right) > 0.3
 
 
 @pytest.mark.parametrize("right", [[True, True], [False, False], [True, False], []])

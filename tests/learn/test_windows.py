@@ -1,7 +1,5 @@
 """Training windows are cut where they are said to lie, and as the search sees them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -27,8 +25,7 @@ def test_another_size_is_that_of_the_searchs_levels(size: tuple[int, int]) -> No
     seen = cut(IMAGE, (0, 0, 160, 120), size)
     # At the edges one mirrors and the other repeats. OpenCV's warp has 32 steps between pixels, the resize 256.
     difference = np.abs(level.astype(int) - seen)[1:-1, 1:-1]
-    assert difference.mean() < 2
-    assert difference.max() <= 10
+    assert difference.mean() < 2 and difference.max() <= 10
 
 
 def test_the_object_stands_in_the_window_where_its_shape_says() -> None:
@@ -46,8 +43,7 @@ def test_people_have_the_usual_window_small_objects_a_small_one_and_a_given_one_
     sizes = np.full((20, 2), (16.0, 16.0))
     assert shape_for(sizes, None).size == (40, 40)
     shape = shape_for(sizes, (64, 64))
-    assert shape.size == (64, 64)
-    assert shape.object_box == pytest.approx((12 / 64, 12 / 64, 40 / 64, 40 / 64))
+    assert shape.size == (64, 64) and shape.object_box == pytest.approx((12 / 64, 12 / 64, 40 / 64, 40 / 64))
 
 
 def test_an_object_is_taken_plain_and_jittered_both_ways_round() -> None:

@@ -1,7 +1,5 @@
 """What scripts written for OpenCV 4 do, to be run under OpenCV 5; `test_opencv5.py` does so."""
 
-from __future__ import annotations
-
 import sys
 import warnings
 from typing import Any

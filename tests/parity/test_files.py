@@ -1,7 +1,5 @@
 """Model files go both ways between limo-hog and OpenCV, coefficient for coefficient."""
 
-from __future__ import annotations
-
 import gzip
 from pathlib import Path
 from typing import Any

@@ -3,8 +3,6 @@
 `docs/parity.md` lists the differences.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Scripts written for OpenCV 4 run under OpenCV 5 after `limo_hog.install_into_cv2()`, and unchanged under 4."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess
@@ -34,7 +32,7 @@ def test_under_opencv_5_the_scripts_run_on_limo_hog(tmp_path: Path, wanted: str,
         pytest.skip("needs uv, to make an environment with OpenCV 5")
     python = tmp_path / "venv" / ("Scripts" if os.name == "nt" else "bin") / "python"
     subprocess.run([uv, "venv", "--quiet", "--python", sys.executable, tmp_path / "venv"], check=True, timeout=60)
-    command = [uv, "pip", "install", "--quiet", "--python", python, wanted]
+    command = [uv, "pip", "install", "--quiet", "--python", str(python), wanted]
     install = subprocess.run(command, capture_output=True, text=True, timeout=240)
     if install.returncode != 0:
         pytest.skip(f"{wanted} cannot be installed here: {install.stderr.strip().splitlines()[-1:]}")

@@ -4,8 +4,6 @@ A combination is made of its seed alone, so a failure names all that is needed t
 the first seeds; `pytest -m slow tests/parity/test_sweep.py` runs them all.
 """
 
-from __future__ import annotations
-
 import math
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Threads that cannot be had are done without; a count that makes no sense is a named error."""
 
-from __future__ import annotations
-
 import os
 from itertools import product
 from pathlib import Path

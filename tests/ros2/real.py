@@ -1,7 +1,5 @@
 """ROS 2's own rclpy, in an environment of its own: a peer that is not ours."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 from pathlib import Path

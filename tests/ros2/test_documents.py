@@ -1,7 +1,5 @@
 """docs/ros2.md lists what is offered, and no more."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

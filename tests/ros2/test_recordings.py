@@ -1,7 +1,5 @@
 """A recording that is damaged, cut off or made to do harm ends in one line, or in what was whole."""
 
-from __future__ import annotations
-
 import itertools
 import random
 import struct

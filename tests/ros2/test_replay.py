@@ -1,7 +1,5 @@
 """A replay goes by the robot's rules: which depth image belongs to a picture, and what a failing detector means."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """The browser lab, served from target/web, in headless Chromium."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The browser lab's detector: rectangles, time, size. `.ci/web` builds it."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 import json

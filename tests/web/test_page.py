@@ -1,7 +1,5 @@
 """The browser lab's page: how soon it is there, pictures and camera, the lesson, keyboard, without a network."""
 
-from __future__ import annotations
-
 import base64
 import io
 import time

@@ -1,7 +1,5 @@
 """One question to OpenCV and to limo-hog alike."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any

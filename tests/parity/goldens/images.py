@@ -7,8 +7,6 @@ wheel; none is downloaded. `answers.json` holds an MD5 of every image, so that a
 answer.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache

@@ -4,8 +4,6 @@ A new case goes into `varied.py`. The digests are those of an x86-64 CPU with AV
 few gradients differently.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import multiprocessing

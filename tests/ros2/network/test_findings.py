@@ -1,7 +1,5 @@
 """What the follower publishes: messages as planners and costmaps read them, with the bytes of Cyclone DDS's encoder."""
 
-from __future__ import annotations
-
 import math
 import threading
 from functools import cache

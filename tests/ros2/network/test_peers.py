@@ -1,7 +1,5 @@
 """Peers that are not ours, Cyclone DDS's C library and Fast DDS, understand us and we them."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -79,10 +79,6 @@ def some_geometry(draw: Draw, clip: float = 0.2) -> tuple[Any, ...]:
     return (*sizes, nbins, 1, sigma, 0, clip, gamma, draw.choice((1, 3, 64)), signed)
 
 
-def some_stride(draw: Draw) -> Pair | None:
-    return draw.choice((None, None, (8, 8), (4, 4), (16, 8), draw.pair(1, 33), (100, 100)))  # type: ignore[no-any-return]
-
-
 def some_padding(draw: Draw) -> Pair | None:
     """A padding; OpenCV takes a negative one as none."""
     return draw.choice((None, (0, 0), (8, 8), draw.pair(0, 48), draw.pair(0, 48), draw.pair(-8, 80)))  # type: ignore[no-any-return]
@@ -123,7 +119,7 @@ def some_search(seed: int, clip: float = 0.2) -> Search:
     geometry = some_geometry(draw, clip)
     win, cell = geometry[0], geometry[3]
     width, height = (max(side + room, 1) for side, room in zip(win, draw.pair(-20, 120), strict=True))
-    win_stride = some_stride(draw)
+    win_stride: Pair | None = draw.choice((None, None, (8, 8), (4, 4), (16, 8), draw.pair(1, 33), (100, 100)))
     length = limo_hog.HOGDescriptor(*geometry).getDescriptorSize()
     windows = max(width - win[0] + 160, 1) * max(height - win[1] + 160, 1)
     step = win_stride or cell

@@ -137,8 +137,7 @@ def test_ctrl_c_keeps_what_is_done(tmp_path: Path) -> None:
     film, file, out = tmp_path / "film.mp4", tmp_path / "out.json", tmp_path / "out"
     film_of(film, frames=2000)
     command = [str(LIMO_HOG), "detect", str(film), "--json", str(file), "--out", str(out)]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-    part = tmp_path / ".out.part.json"
+    process, part = subprocess.Popen(command, stderr=subprocess.PIPE, text=True), tmp_path / ".out.part.json"
     deadline = time.monotonic() + 30
     while not (part.exists() and part.stat().st_size) and time.monotonic() < deadline:
         time.sleep(0.02)

@@ -61,13 +61,11 @@ def test_stopping_does_not_wait_for_a_reader_that_never_returns(pictures: Path, 
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as child:
         assert child.stdout is not None and child.stdout.readline() == "begun\n"
         time.sleep(1.5)
-        began = time.monotonic()
         child.send_signal(signal.SIGINT)
         try:
-            assert child.wait(5) == 128 + signal.SIGINT
+            assert child.wait(2.5) == 128 + signal.SIGINT
         finally:
             child.kill()
-        assert time.monotonic() - began < 2.5
 
 
 def test_a_picture_of_too_many_pixels_is_refused_by_its_header(pictures: Path) -> None:

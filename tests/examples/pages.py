@@ -35,11 +35,6 @@ class Page:
         return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-def pages() -> list[Page]:
-    """Every page that is written for readers of the repository."""
-    return [Page(path) for path in sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), ROOT / "sim" / "README.md"])]
-
-
 def file_of(page: Page, link: str) -> Path | None:
     """The file in the repository that a link leads to; None for other places on the web."""
     target = link.partition("#")[0]

@@ -163,7 +163,9 @@ def terminals(_: str, numbers: range, folder: Path) -> tuple[Counter[str], list[
         with _robot() if typed in AT_A_ROBOT else nullcontext():
             for how in ("", *TERMINALS):
                 place = _place(folder, f"{number} {how}".replace("/", ""))
-                done = _in_terminal(how, typed, place)
+                shell, env = ("", os.environ | ASCII) if how == "ascii" else (how, None)
+                command = ["bash", "-c", f'set -o pipefail; "$@" {shell}', "-", *LIMO_HOG, *typed.split()]
+                done = subprocess.run(command, check=False, capture_output=True, cwd=place, timeout=LATEST_S, env=env)
                 told = done.stderr.decode(errors="replace")
                 written = _written(place)
                 # How often a follower changes its mind in three seconds is the run's.
@@ -181,12 +183,6 @@ def terminals(_: str, numbers: range, folder: Path) -> tuple[Counter[str], list[
                 ends[str(done.returncode)] += 1
                 print(f"{typed} {how}: {found}", flush=True)
     return ends, findings
-
-
-def _in_terminal(how: str, typed: str, place: Path) -> subprocess.CompletedProcess[bytes]:
-    shell, env = ("", os.environ | ASCII) if how == "ascii" else (how, None)
-    command = ["bash", "-c", f'set -o pipefail; "$@" {shell}', "-", *LIMO_HOG, *typed.split()]
-    return subprocess.run(command, check=False, capture_output=True, cwd=place, timeout=LATEST_S, env=env)
 
 
 @contextmanager

@@ -42,6 +42,8 @@ PICTURES, FILMS = (".png", ".jpg", ".bmp", ".webp", ".tiff", ".ppm", ".jp2"), ("
 VALUE = re.compile(rb'-?\d+\.?\d*(?:[eE][-+]?\d+)?|"[^"\n]*"|\b(?:true|false|null)\b')
 OTHERS = b"nan inf -inf NaN Infinity 1e999 -1 0 -0.0 1 2.5 1e-300 1e300 4294967296 true null [] {} [1,2]".split()
 OTHERS += [b"9" * 40, b'""', b'"x"', b'"\\u001b[2J"', b'"../.."']
+#: What bytes a file's name may have.
+LETTERS = bytes(one for one in range(1, 256) if one != ord("/"))
 #: Libraries that a command may import.
 LIBRARIES = "limo_hog limo_sim cv2 av numpy rich pymunk rosbags mcap".split()
 
@@ -53,11 +55,6 @@ def _other_values(data: bytes, draw: random.Random) -> bytes:
         first, last = draw.choice(places[: draw.choice((100, len(places)))])
         data = data[:first] + draw.choice(OTHERS) + data[last:]
     return data
-
-
-def _bad_name(draw: random.Random) -> bytes:
-    letters = bytes(one for one in range(1, 256) if one != ord("/"))
-    return bytes(draw.choice(letters) for _ in range(draw.choice((1, 3, 20, 200))))
 
 
 def _inputs(kind: str, folder: Path) -> tuple[list[bytes], str, Callable[[Path], list[str]]]:
@@ -174,7 +171,8 @@ def many(kind: str, numbers: range, folder: Path) -> tuple[Counter[str], list[st
         for number in range(first, min(numbers.stop, first + AT_ONCE)):
             draw = random.Random(number)
             suffix, data = draw.choice(whole)
-            name = os.fsencode(place) + b"/" + (_bad_name(draw) if kind == "names" else b"%d" % number) + suffix
+            bad = bytes(draw.choice(LETTERS) for _ in range(draw.choice((1, 3, 20, 200))))
+            name = os.fsencode(place) + b"/" + (bad if kind == "names" else b"%d" % number) + suffix
             with open(name, "wb") as file:  # noqa: PTH123 - a name of bytes
                 file.write(data if kind == "names" else damaged(data, draw))
         code, told = _answer(["detect", str(place), "--json", "found", "--overwrite"], folder)

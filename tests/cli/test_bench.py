@@ -45,8 +45,8 @@ def test_each_size_image_and_thread_count_is_a_row(answer_to: AnswerTo) -> None:
 def test_without_a_rival_this_detector_is_timed_alone(answer_to: AnswerTo, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr(cv2, "HOGDescriptor")
     (row,) = rows_of(answer_to, *SMALL)
-    assert row["limo_ms"]["min"] > 0
-    assert [row[name] for name in ("cv2_ms", "ratio", "rects_equal", "max_weight_diff")] == [None] * 4
+    unknown = [row[name] for name in ("cv2_ms", "ratio", "rects_equal", "max_weight_diff")]
+    assert row["limo_ms"]["min"] > 0 and unknown == [None] * 4
     assert "pip install 'opencv-python-headless<5' to compare" in answer_to(*SMALL).out
 
 

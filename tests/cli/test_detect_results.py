@@ -52,8 +52,7 @@ def test_copies_and_lines_that_are_there_are_not_made_again(pictures: Path, tmp_
     file.write_text("".join(before.splitlines(keepends=True)[:8]))
     assert main(arguments) == 0
     now, then = ([(r["source"], r["frame"]) for r in lines_of(text)] for text in (file.read_text(), before))
-    assert now == then
-    assert (out / "film.mp4").stat().st_mtime_ns == made[out / "film.mp4"]
+    assert now == then and (out / "film.mp4").stat().st_mtime_ns == made[out / "film.mp4"]
 
 
 def test_results_go_through_a_pipe_which_keeps_nothing(pictures: Path, tmp_path: Path, answer_to: AnswerTo) -> None:

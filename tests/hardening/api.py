@@ -2,8 +2,6 @@
 
 `python -m tests.hardening.api --calls 10000000 --state FILE` makes the calls in processes of 100,000 each and writes
 what it found to FILE; started again, it goes on where it stopped. `--only N` makes call N alone, here.
-
-`tests/parity/test_sweep.py` puts calls with ordinary arguments to OpenCV, too.
 """
 
 import argparse

@@ -46,9 +46,7 @@ def test_people_too_small_for_the_large_window_are_found_by_the_small_one() -> N
     assert len(limo) > len(large)
 
 
-@pytest.mark.parametrize(
-    "options", [*({"min_height": height} for height in (64, 96, 200)), {"min_height": None, "nms": "group"}]
-)
+@pytest.mark.parametrize("options", [*({"min_height": h} for h in (64, 96, 200)), {"min_height": None, "nms": "group"}])
 def test_from_64_px_on_and_in_opencvs_grouping_the_large_window_alone_is_used(options: dict[str, Any]) -> None:
     picture = street(640, 480, 3)
     first = partial(PeopleDetector, second_look=False, **options)

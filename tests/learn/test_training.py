@@ -68,8 +68,7 @@ def test_nothing_is_held_out_where_no_object_can_be(bollards: Path, tmp_path: Pa
     (tmp_path / "boxes.json").write_text(json.dumps({name: labels[name] if name == first else [] for name in labels}))
     with pytest.warns(LabelWarning, match="objects only|--validate"):
         data = gather(Wanted((tmp_path / "boxes.json",), pictures=bollards))
-    assert data.validation == ()
-    assert measure(_train(data, replace(SMALL, rounds=0))[0], data, final=True) == {}
+    assert data.validation == () and measure(_train(data, replace(SMALL, rounds=0))[0], data, final=True) == {}
     assert len(data.negatives.paths) == 20
 
 
@@ -122,8 +121,7 @@ def test_crops_are_learnt_from_once_each(crops: Path) -> None:
     (done,) = _train(data, replace(SMALL, rounds=0))
     assert done.objects == len(data.regions) - 1
     # Where crops of people have theirs; what they were cut from is not known, and so nothing can be measured.
-    assert data.shape.object_box == PERSON_BOX
-    assert measure(done, data, final=True) == {}
+    assert data.shape.object_box == PERSON_BOX and measure(done, data, final=True) == {}
 
 
 def test_a_class_that_is_missing_is_named(crops: Path) -> None:

@@ -61,8 +61,7 @@ def test_an_object_is_taken_plain_and_jittered_both_ways_round() -> None:
 def test_random_windows_lie_in_the_picture() -> None:
     rng = np.random.default_rng(1)
     boxes = np.array(random_boxes((300, 200), (64, 128), 200, rng))
-    assert len(boxes) == 200
-    assert (boxes[:, :2] >= 0).all()
+    assert len(boxes) == 200 and (boxes[:, :2] >= 0).all()
     assert (boxes[:, 0] + boxes[:, 2] <= 300 + 1e-9).all() and (boxes[:, 1] + boxes[:, 3] <= 200 + 1e-9).all()
     assert boxes[:, 2].min() < 70 and boxes[:, 2].max() > 95
     assert random_boxes((63, 500), (64, 128), 10, rng) == []

@@ -1,7 +1,4 @@
-"""Where OpenCV 4.14 crashes, errs or answers at random, limo-hog answers or names the error.
-
-`docs/parity.md` lists the differences.
-"""
+"""Where OpenCV 4.14 crashes, errs or answers at random, limo-hog answers or names the error: see docs/parity.md."""
 
 import json
 from collections.abc import Callable

@@ -110,10 +110,8 @@ def test_a_search_takes_at_most_three_times_as_long_as_with_sse41(lab: Lab) -> N
         base64.b64encode(np.random.default_rng(0).integers(0, 256, (480, 640, 3), np.uint8).tobytes()).decode(),
     )
     once = "() => { const begun = performance.now(); lab.search(window.noise); return performance.now() - begun; }"
-    environment = os.environ | {"LIMO_HOG_BACKEND": "sse41"}
-    native = subprocess.Popen(
-        [sys.executable, "-c", NATIVE], env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
+    command, env, pipe = [sys.executable, "-c", NATIVE], os.environ | {"LIMO_HOG_BACKEND": "sse41"}, subprocess.PIPE
+    native = subprocess.Popen(command, env=env, stdin=pipe, stdout=pipe, text=True)
     assert native.stdin is not None and native.stdout is not None
     with native:
         wasm, sse41 = [], []

@@ -1,7 +1,5 @@
 """How a command ended, and what it printed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Random searches for the sweep, the goldens and the random calls: each is made of its number alone."""
 
-from __future__ import annotations
-
 import math
 import random
 from dataclasses import dataclass
@@ -81,11 +79,6 @@ def some_geometry(draw: Draw, clip: float = 0.2) -> tuple[Any, ...]:
     return (*sizes, nbins, 1, sigma, 0, clip, gamma, draw.choice((1, 3, 64)), signed)
 
 
-def some_stride(draw: Draw) -> Pair | None:
-    """A window stride."""
-    return draw.choice((None, None, (8, 8), (4, 4), (16, 8), draw.pair(1, 33), (100, 100)))  # type: ignore[no-any-return]
-
-
 def some_padding(draw: Draw) -> Pair | None:
     """A padding; OpenCV takes a negative one as none."""
     return draw.choice((None, (0, 0), (8, 8), draw.pair(0, 48), draw.pair(0, 48), draw.pair(-8, 80)))  # type: ignore[no-any-return]
@@ -93,8 +86,6 @@ def some_padding(draw: Draw) -> Pair | None:
 
 @dataclass(frozen=True)
 class Search:
-    """One geometry with what is asked of it."""
-
     seed: int
     geometry: tuple[Any, ...]
     size: Pair
@@ -124,12 +115,11 @@ class Search:
 
 
 def some_search(seed: int, clip: float = 0.2) -> Search:
-    """Search number `seed`."""
     draw = Draw(seed)
     geometry = some_geometry(draw, clip)
     win, cell = geometry[0], geometry[3]
     width, height = (max(side + room, 1) for side, room in zip(win, draw.pair(-20, 120), strict=True))
-    win_stride = some_stride(draw)
+    win_stride: Pair | None = draw.choice((None, None, (8, 8), (4, 4), (16, 8), draw.pair(1, 33), (100, 100)))
     length = limo_hog.HOGDescriptor(*geometry).getDescriptorSize()
     windows = max(width - win[0] + 160, 1) * max(height - win[1] + 160, 1)
     step = win_stride or cell

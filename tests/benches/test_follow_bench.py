@@ -1,7 +1,5 @@
 """Follow-Bench's files become our scenes at half their size, and its oracles follow the first person."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -37,19 +35,14 @@ def scene(tmp_path: Path) -> Scenario:
 
 def test_lengths_and_speeds_are_halved_about_the_middle(scene: Scenario) -> None:
     target, *others = scene.people
-    assert scene.room.half == 10.0
-    assert target.route == ((-5.0, 0.0, 0.0), (5.0, 0.0, 0.0))
+    assert scene.room.half == 10.0 and target.route == ((-5.0, 0.0, 0.0), (5.0, 0.0, 0.0))
     assert [person.speed for person in scene.people] == [0.75, 0.5, 0.75, 0.75]
     assert (scene.robot.x, scene.robot.y, scene.robot.yaw) == (-5.0 - BEHIND, 0.0, 0.0)
     assert all(person.yields for person in others)
-
-
-def test_people_walk_to_and_fro_and_a_corner_within_a_block_is_left_out(scene: Scenario) -> None:
-    _, three, single, blocked = scene.people
+    # People walk to and fro, and a corner within a block is left out.
+    three, single, blocked = others
     assert [corner[:2] for corner in three.route] == [(0.0, -1.0), (2.0, -1.0), (2.0, -3.0), (2.0, -1.0)]
-    assert len(single.route) == 2
-    assert len(blocked.route) == 1
-    assert "1 corners left out" in scene.summary
+    assert (len(single.route), len(blocked.route)) == (2, 1) and "1 corners left out" in scene.summary
 
 
 def test_a_thin_block_is_a_wall_and_a_thick_one_is_hollow(scene: Scenario) -> None:
@@ -70,7 +63,6 @@ def test_an_oracle_follows_the_first_person_and_comes_nearer(name: str, scene: S
     play(arena, oracle(name, arena), 5.0, names=(name, "truth"), watch=steps.append)
     for step in (one for one in steps if one.seen is not None):
         target, first = step.log.decision.target, step.seen.people[0] if step.seen else None
-        assert target is not None
-        assert first is not None
+        assert target is not None and first is not None
         assert tuple(step.log.detections.windows[target]) == first.box
     assert steps[-1].truth.robot[0] > scene.robot.x + 0.5

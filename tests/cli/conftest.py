@@ -1,7 +1,5 @@
 """Folders that several tests of the command line read."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pictures and films for `detect`, and its JSON lines read back."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

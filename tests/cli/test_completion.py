@@ -1,7 +1,5 @@
 """`limo-hog completion` prints a script with which a shell completes commands, options and values."""
 
-from __future__ import annotations
-
 import subprocess
 
 import pytest
@@ -24,10 +22,10 @@ from limo_hog.cli.main import ARENA, BUILT_IN
 )
 def test_bash_completes(typed: str, offered: set[str], answer_to: AnswerTo) -> None:
     script = answer_to("completion", "bash").out
-    complete = (
-        f'COMP_WORDS=({typed}); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); _shtab_limo_hog; echo "${{COMPREPLY[@]}}"'
+    script += (
+        f"\nCOMP_WORDS=({typed}); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); _shtab_limo_hog; echo ${{COMPREPLY[*]}}"
     )
-    done = subprocess.run(["bash", "-c", f"{script}\n{complete}"], capture_output=True, text=True, check=True)
+    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True)
     found = {word for word in done.stdout.split() if word.startswith("--") or not word.startswith("-")}
     assert found == offered
 

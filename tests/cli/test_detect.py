@@ -1,7 +1,5 @@
 """`limo-hog detect` finds people in whatever it is given, and keeps what is done whatever happens."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os
@@ -88,8 +86,7 @@ def test_a_film_gives_a_line_a_frame_and_an_annotated_copy(tmp_path: Path, answe
 
 def test_one_picture_is_summed_up_in_one_unit(pictures: Path, answer_to: AnswerTo) -> None:
     _, out, err = answer_to("detect", pictures / "c.png")
-    assert "  0 people " in out
-    assert re.fullmatch(r"1 picture, 0 people; detection [\d.]+ ms\n", err)
+    assert "  0 people " in out and re.fullmatch(r"1 picture, 0 people; detection [\d.]+ ms\n", err)
 
 
 WIDE = street(320, 240, 3)
@@ -108,9 +105,7 @@ SMALL = np.asarray(cv2.resize(PICTURE, None, fx=0.4, fy=0.4, interpolation=cv2.I
         (" ".join(OPENCVS), PICTURE, {"model": "opencv", "min_height": None, "nms": "group"}),
     ],
 )
-def test_every_option_reaches_the_detector(
-    typed: str, image: Any, options: Any, tmp_path: Path, answer_to: AnswerTo
-) -> None:
+def test_options_reach_the_detector(typed: str, image: Any, options: Any, tmp_path: Path, answer_to: AnswerTo) -> None:
     write_image(tmp_path / "a.png", image)
     (result,) = lines_of(answer_to("detect", tmp_path / "a.png", "--json", "-", *typed.split()).out)
     found = PeopleDetector(**options).detect(image)
@@ -131,9 +126,7 @@ def test_a_terminal_shows_probabilities_or_margins(pictures: Path, tmp_path: Pat
     assert f"{result['scores'][0]:.2f}" in answer_to("detect", path, "--model", model).out
 
 
-def test_a_picture_is_searched_once_however_its_name_is_spelled(
-    pictures: Path, here: Path, answer_to: AnswerTo
-) -> None:
+def test_a_picture_is_searched_once_however_it_is_spelled(pictures: Path, here: Path, answer_to: AnswerTo) -> None:
     film_of(Path("film.mp4"), frames=2)
     Path("link").symlink_to("in")
     Path("in", "z.png").symlink_to("a.png")  # a picture of another name

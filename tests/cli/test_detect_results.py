@@ -1,7 +1,5 @@
 """What `detect` writes is whole, replaced only when asked, and gone on from."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os
@@ -53,10 +51,8 @@ def test_copies_and_lines_that_are_there_are_not_made_again(pictures: Path, tmp_
     # Lines that a killed run lacks are added, and the film's copy stays.
     file.write_text("".join(before.splitlines(keepends=True)[:8]))
     assert main(arguments) == 0
-    assert [(r["source"], r["frame"]) for r in lines_of(file.read_text())] == [
-        (r["source"], r["frame"]) for r in lines_of(before)
-    ]
-    assert (out / "film.mp4").stat().st_mtime_ns == made[out / "film.mp4"]
+    now, then = ([(r["source"], r["frame"]) for r in lines_of(text)] for text in (file.read_text(), before))
+    assert now == then and (out / "film.mp4").stat().st_mtime_ns == made[out / "film.mp4"]
 
 
 def test_results_go_through_a_pipe_which_keeps_nothing(pictures: Path, tmp_path: Path, answer_to: AnswerTo) -> None:
@@ -119,7 +115,7 @@ WRONG: list[tuple[str, object]] = [
 ]
 
 
-def test_a_line_with_a_value_of_another_kind_is_not_gone_on_from(
+def test_a_line_with_values_of_another_kind_is_not_gone_on_from(
     pictures: Path, here: Path, answer_to: AnswerTo
 ) -> None:
     arguments = ("detect", pictures / "a.png", "--json", "found.json", "--csv", "found.csv")
@@ -140,29 +136,24 @@ def test_ctrl_c_keeps_what_is_done(tmp_path: Path) -> None:
     film, file, out = tmp_path / "film.mp4", tmp_path / "out.json", tmp_path / "out"
     film_of(film, frames=2000)
     command = [str(LIMO_HOG), "detect", str(film), "--json", str(file), "--out", str(out)]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-    part = tmp_path / ".out.part.json"
+    process, part = subprocess.Popen(command, stderr=subprocess.PIPE, text=True), tmp_path / ".out.part.json"
     deadline = time.monotonic() + 30
     while not (part.exists() and part.stat().st_size) and time.monotonic() < deadline:
         time.sleep(0.02)
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=30)
-    assert process.returncode == 130
-    assert said.splitlines()[-1] == "limo-hog: stopped"
+    assert process.returncode == 130 and said.splitlines()[-1] == "limo-hog: stopped"
     assert "Traceback" not in said
     frames = [r["frame"] for r in lines_of(file.read_text())]
-    assert frames == list(range(len(frames)))
-    assert 0 < len(frames) < 2000
-    assert list(out.iterdir()) == []
-    assert not part.exists()
+    assert frames == list(range(len(frames))) and 0 < len(frames) < 2000
+    assert list(out.iterdir()) == [] and not part.exists()
 
 
 def test_a_full_disk_is_one_line_and_leaves_nothing_half_written(pictures: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     typed = ["detect", str(pictures), "--out", str(out), "--json", str(out / "o.json")]
     done = on_a_full_disk(64_000, *typed)
-    assert done.returncode == 1
-    assert os.strerror(errno.EFBIG) in done.stderr and "Traceback" not in done.stderr
+    assert done.returncode == 1 and os.strerror(errno.EFBIG) in done.stderr and "Traceback" not in done.stderr
     for path in out.rglob("*.png"):
         assert cv2.imread(str(path)) is not None
     assert lines_of((out / "o.json").read_text()) is not None

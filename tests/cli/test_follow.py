@@ -1,7 +1,5 @@
 """`limo-hog follow` and `limo-hog score`, as a user types them."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

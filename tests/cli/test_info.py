@@ -1,7 +1,5 @@
 """`limo-hog info` shows versions, hardware and extras."""
 
-from __future__ import annotations
-
 import importlib.metadata
 
 import cv2
@@ -10,13 +8,8 @@ from tests.answers import AnswerTo
 
 
 def test_info_names_versions_hardware_and_extras(answer_to: AnswerTo, monkeypatch: pytest.MonkeyPatch) -> None:
-    def lacking(name: str) -> str:
-        if name in ("av", "limo-sim"):
-            raise importlib.metadata.PackageNotFoundError(name)
-        return real_version(name)
-
-    real_version = importlib.metadata.version
-    monkeypatch.setattr("limo_hog.cli.support.environment.version", lacking)
+    real_version, lacking = importlib.metadata.version, {"av": "not-there", "limo-sim": "not-there"}
+    monkeypatch.setattr("limo_hog.cli.support.environment.version", lambda one: real_version(lacking.get(one) or one))
     shown = " ".join(answer_to("info").out.split())
     wanted = ["limo-hog", "backend", "CPU features", "threads", f"{cv2.__version__} (with HOGDescriptor)"]
     wanted += [f"{extra} not installed: pip install 'limo-hog[{extra}]'" for extra in ("video", "sim")]

@@ -1,7 +1,5 @@
 """`limo-hog` routes to commands, answers errors in one line and with an exit code."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path
@@ -43,8 +41,3 @@ def test_a_command_imports_the_libraries_that_it_needs(typed: str, imported: set
     code = "import sys; from limo_hog.cli.main import main; main(); print(*sys.modules, sep='\\n')"
     done = subprocess.run([sys.executable, "-c", code, *typed.split()], check=True, capture_output=True, text=True)
     assert {"cv2", "rich", "limo_sim", "aiohttp"} & {*done.stdout.splitlines()} == imported
-
-
-def test_an_empty_name_of_a_file_is_answered_with_the_usage(answer_to: AnswerTo) -> None:
-    code, _, err = answer_to("detect", "a.png", "--json", "")
-    assert code == 2 and err.startswith("usage: limo-hog") and "'' is no file" in err

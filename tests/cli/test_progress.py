@@ -1,7 +1,5 @@
 """What a progress bar says: how far it is, and how long it takes where that is known."""
 
-from __future__ import annotations
-
 import pytest
 from rich.progress import Task
 

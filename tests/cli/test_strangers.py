@@ -1,7 +1,5 @@
 """Names, files, pipes and terminals of others: a command names what it cannot use, does the rest, and ends."""
 
-from __future__ import annotations
-
 import json
 import math
 import os
@@ -63,13 +61,11 @@ def test_stopping_does_not_wait_for_a_reader_that_never_returns(pictures: Path, 
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as child:
         assert child.stdout is not None and child.stdout.readline() == "begun\n"
         time.sleep(1.5)
-        began = time.monotonic()
         child.send_signal(signal.SIGINT)
         try:
-            assert child.wait(5) == 128 + signal.SIGINT
+            assert child.wait(2.5) == 128 + signal.SIGINT
         finally:
             child.kill()
-        assert time.monotonic() - began < 2.5
 
 
 def test_a_picture_of_too_many_pixels_is_refused_by_its_header(pictures: Path) -> None:
@@ -288,10 +284,3 @@ def test_pictures_are_searched_while_python_ends(tmp_path: Path) -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=60)
     assert int(done.stdout) >= 8 and not done.stderr
-
-
-def test_what_cannot_be_written_is_told_before_the_work(tmp_path: Path, answer_to: AnswerTo) -> None:
-    (tmp_path / "file").write_text("")
-    for option in ("--json", "--csv"):
-        target = tmp_path / "file" / "a.csv"
-        assert answer_to("score", option, target) == (1, "", f"limo-hog: {target}: Not a directory\n")

@@ -1,9 +1,8 @@
 """Wrong command lines: each is answered at once, by one line that says what is wrong and what is wanted."""
 
-from __future__ import annotations
-
 import os
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -47,6 +46,7 @@ WRONG_ARGUMENTS = [
     ("detect a.jpg --resume", "give one of them"),
     ("detect a.jpg --resume --overwrite --json x", "not allowed with argument --resume"),
     ("detect a.jpg --csv -", "standard output is for --json -"),
+    ("detect a.jpg --json ''", "'' is no file"),
     ("detect a.jpg --mot a.txt", "add --track"),
     ("detect a.jpg --track --mot -", "want a file's name"),
     ("detect a.jpg rtsp://camera/live --track --mot a.txt", "--mot is for one film, or for pictures that are one"),
@@ -115,6 +115,7 @@ IMPOSSIBLE = [
     ("score --controller policy:none.npz", "none.npz: cannot be read as a policy"),
     ("score --detector yolo", "no detector 'yolo': want one of hog,"),
     ("score --controller approach --target 2", "the approach controller holds no distance"),
+    *((f"score {option} there.txt/a.csv", "there.txt/a.csv: Not a directory") for option in ("--json", "--csv")),
     ("run none.py", "none.py: no such file"),
     ("workshop check none.py", "none.py: no such file"),
     ("replay none.mcap", "none.mcap"),
@@ -138,7 +139,7 @@ def folder(here: Path) -> None:
 @pytest.mark.parametrize(("typed", "told"), WRONG_ARGUMENTS)
 def test_wrong_arguments_are_answered_by_one_line_and_2(typed: str, told: str, answer_to: AnswerTo) -> None:
     before = sorted(Path().rglob("*"))
-    code, out, err = answer_to(*typed.split())
+    code, out, err = answer_to(*shlex.split(typed))
     assert (code, out, sorted(Path().rglob("*"))) == (2, "", before)
     told_lines = [line for line in err.splitlines() if told in line]
     assert len(told_lines) == 1 and len(told_lines[0]) < 300

@@ -1,7 +1,5 @@
 """`install_into_cv2`: which names it puts into `cv2`, what it says, and what `except cv2.error` catches afterwards."""
 
-from __future__ import annotations
-
 import sys
 import warnings
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Pictures are resized as OpenCV's exact linear resize does it, without OpenCV."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The Markdown pages of the repository, and what is in them."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,8 +11,6 @@ _LINK = re.compile(r"(!?)\[[^\]]*\]\(([^)\s]+)\)")
 
 @dataclass(frozen=True)
 class Page:
-    """A Markdown file."""
-
     path: Path
 
     def __str__(self) -> str:
@@ -26,12 +22,10 @@ class Page:
 
     @property
     def python(self) -> list[str]:
-        """The Python blocks, top to bottom."""
         return [body for language, body in _FENCE.findall(self.text) if language == "python"]
 
     @property
     def links(self) -> list[str]:
-        """Every target of a link or a picture."""
         return [target for _, target in _LINK.findall(_FENCE.sub("", self.text))]
 
     @property
@@ -39,11 +33,6 @@ class Page:
         """What `#…` may lead to: each heading in small letters, hyphens for spaces, without punctuation."""
         headings = re.findall(r"^#+ (.*)$", _FENCE.sub("", self.text), re.MULTILINE)
         return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
-
-
-def pages() -> list[Page]:
-    """Every page that is written for readers of the repository."""
-    return [Page(path) for path in sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), ROOT / "sim" / "README.md"])]
 
 
 def file_of(page: Page, link: str) -> Path | None:

@@ -1,7 +1,5 @@
 """README and docs: links lead somewhere, every page can be reached, Python blocks are Python and import what exists."""
 
-from __future__ import annotations
-
 import ast
 import importlib
 import re
@@ -14,9 +12,10 @@ from pathlib import Path
 
 import pytest
 from benches.rivals import FOUND, finders
-from tests.examples.pages import ROOT, Page, file_of, pages
+from tests.examples.pages import ROOT, Page, file_of
 
-PAGES = pages()
+#: Every page that is written for readers of the repository.
+PAGES = [*map(Page, sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), ROOT / "sim" / "README.md"]))]
 #: Shown on package pages as well as in the repository.
 READMES = [Page(ROOT / "README.md"), Page(ROOT / "sim" / "README.md")]
 

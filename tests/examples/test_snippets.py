@@ -1,7 +1,5 @@
 """The Python blocks of both READMEs and of docs/coming-from.md run, and do what the pages say."""
 
-from __future__ import annotations
-
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -82,7 +80,6 @@ def test_a_saved_svm_decides_in_the_detector_as_in_opencv(folder: Path, kind: st
     (recipe,) = (block for block in Page(ROOT / "docs/coming-from.md").python if "opencv_ml_svm" in block)
     names: dict[str, Any] = {"cv2": cv2, "np": np, "limo_hog": limo_hog}
     exec(recipe, names)
-
     margins = features @ names["coefficients"][:-1] + names["coefficients"][-1]
     said = svm.predict(features)[1].ravel()
     sure = np.abs(margins) > 1e-3  # support vectors of a one-class SVM lie on the border
@@ -94,10 +91,8 @@ def test_a_saved_svm_decides_in_the_detector_as_in_opencv(folder: Path, kind: st
 def test_coming_from_other_libraries(folder: Path) -> None:
     saved_svm(folder, cv2.ml.SVM_C_SVC, -1)
     names = run("docs/coming-from.md")
-
     # scikit-image: the drawing of the photograph, and a row of numbers for each face.
-    assert names["drawing"].shape == names["gray"].shape
-    assert names["descriptors"].shape == (20, 13 * 13 * 4 * 8)
+    assert names["drawing"].shape == names["gray"].shape and names["descriptors"].shape == (20, 13 * 13 * 4 * 8)
 
     # dlib: inclusive corners, best first.
     assert len(names["corners"]) >= 2

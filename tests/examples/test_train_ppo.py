@@ -1,7 +1,5 @@
 """The example that learns to follow writes a policy that drives."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path
@@ -12,9 +10,7 @@ import pytest
 from limo_sim.run.baselines import Policy
 from limo_sim.run.last_seen import SIZE
 
-pytest.importorskip(
-    "stable_baselines3", reason="stable-baselines3 is not installed: it brings torch, several gigabytes"
-)
+pytest.importorskip("stable_baselines3", reason="needs stable-baselines3, which brings torch, several gigabytes")
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "train_ppo.py"
 

@@ -1,7 +1,5 @@
 """Descriptors of many crops: those of `HOGDescriptor.compute`, within 1e-6."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -12,7 +10,6 @@ import limo_hog
 
 
 def crops_of(count: int, width: int, height: int, channels: int) -> NDArray[np.uint8]:
-    """Return crops with edges and noise."""
     random = np.random.default_rng(width * height + channels)
     coarse = random.integers(0, 200, (count, -(-height // 5), -(-width // 5), channels), np.uint8)
     shapes = coarse.repeat(5, axis=1).repeat(5, axis=2)[:, :height, :width]

@@ -1,7 +1,5 @@
 """PeopleDetector: its arguments, the boxes it gives, and their agreement with OpenCV where it asks for OpenCV's."""
 
-from __future__ import annotations
-
 import copy
 import json
 import pickle
@@ -53,11 +51,7 @@ def test_grouped_and_at_the_images_own_size_the_boxes_are_opencvs(model: str) ->
     for image in (picture(), street(800, 600, 1)):
         theirs = np.reshape(hog.detectMultiScale(image, padding=(4, 4))[0], (-1, 4)).tolist()
         both.append((sorted(detector.detect(image).windows.tolist()), sorted(theirs)))
-    assert any(ours for ours, _ in both)
-    assert all(ours == theirs for ours, theirs in both)
-
-
-# Sizes of people.
+    assert any(ours for ours, _ in both) and all(ours == theirs for ours, theirs in both)
 
 
 def test_people_of_the_height_asked_for_are_found() -> None:
@@ -94,9 +88,7 @@ def test_people_taller_than_asked_for_are_left_out() -> None:
     assert len(limits) > 1
     for limit in limits.tolist():
         assert PeopleDetector(max_height=limit).detect(picture()) == all_of_them[all_of_them.boxes[:, 3] < limit]
-
-
-def test_people_of_exactly_the_greatest_height_are_reported() -> None:
+    # Those of exactly the greatest height are reported.
     every_window = PeopleDetector(threshold=-9.0, overlap=1, second_look=False)
     for max_height, window_height in ((64, 82), (65, 82), (67, 86)):  # 64 / 0.78, and 1.05 times that
         found = replace(every_window, max_height=max_height).detect(picture()[200:360, 300:400])
@@ -124,9 +116,6 @@ def test_an_image_that_would_be_enlarged_beyond_memory_is_refused() -> None:
         PeopleDetector(min_height=None).detect(np.broadcast_to(np.uint8(0), (20000, 20000)))
 
 
-# One box a person.
-
-
 def test_of_hits_on_one_person_the_best_stays_by_the_person_boxes_overlap() -> None:
     detector = PeopleDetector(model="opencv", min_height=None, threshold=-0.7, **RAW)
     hits = detector.detect(picture())
@@ -147,11 +136,7 @@ def test_the_limit_of_overlap_can_be_chosen() -> None:
     assert 0 < few < some < many
     # A threshold below -1 gives more, the surest first.
     fewer, more = (PeopleDetector(threshold=t, second_look=False).detect(picture()) for t in (None, -1.2))
-    assert len(more) > len(fewer) and -1.2 <= more.scores.min() < 0
-    assert (np.diff(more.scores) <= 0).all()
-
-
-# What a detector is.
+    assert len(more) > len(fewer) and -1.2 <= more.scores.min() < 0 and (np.diff(more.scores) <= 0).all()
 
 
 def test_a_detector_cannot_be_changed() -> None:
@@ -184,8 +169,7 @@ def test_on_photographs_a_guided_search_misses_few_hits_and_adds_none() -> None:
             every, some = ({*map(tuple, one.detect(file).windows.tolist())} for one in (exact, guided))
             assert some <= every
             hits, misses = hits + len(every), misses + len(every - some)
-    assert misses < 0.03 * hits
-    assert hits > 100
+    assert misses < 0.03 * hits and hits > 100
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])
@@ -206,12 +190,9 @@ def test_an_image_among_many_that_is_none_is_named_at_its_turn() -> None:
 
 def test_threads_share_a_detector() -> None:
     detector = PeopleDetector()
-    alone = detector.detect(picture())
     with ThreadPoolExecutor(4) as pool:
-        assert all(found == alone for found in pool.map(detector.detect, [picture()] * 8))
+        assert [*pool.map(detector.detect, [picture()] * 8)] == [detector.detect(picture())] * 8
 
-
-# Arguments.
 
 #: Without its types, so that they can be wrong.
 untyped: Any = limo_hog
@@ -254,14 +235,10 @@ def test_a_wrong_argument_is_named_when_a_detector_is_made(arguments: Any, kind:
 
 
 def test_numbers_of_numpy_and_lists_are_arguments_like_others() -> None:
-    detector = untyped.PeopleDetector(
-        threshold=np.float32(0.5), win_stride=[8, 8], padding=np.array([4, 4]), min_height=np.int64(64), overlap=1
-    )
-    assert detector == PeopleDetector(threshold=0.5, overlap=1.0)
-    assert hash(detector) == hash(PeopleDetector(threshold=0.5, overlap=1.0))
-
-
-# Models in files.
+    steps = {"win_stride": [8, 8], "padding": np.array([4, 4])}
+    detector = untyped.PeopleDetector(threshold=np.float32(0.5), min_height=np.int64(64), overlap=1, **steps)
+    plain = PeopleDetector(threshold=0.5, overlap=1.0)
+    assert detector == plain and hash(detector) == hash(plain)
 
 
 def saved(path: Path, card: Any = None) -> Path:
@@ -326,7 +303,6 @@ def test_a_model_with_a_coefficient_that_is_no_finite_number_is_refused(tmp_path
 
 
 def test_a_file_without_an_svm_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "bare.yml"
-    HOGDescriptor().save(path)
+    HOGDescriptor().save(tmp_path / "bare.yml")
     with pytest.raises(limo_hog.ModelFormatError, match=r"bare\.yml holds a geometry without an SVM"):
-        PeopleDetector(model=path)
+        PeopleDetector(model=tmp_path / "bare.yml")

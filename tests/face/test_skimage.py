@@ -1,7 +1,5 @@
 """`limo_hog.skimage.hog` beside scikit-image's own: the same numbers, drawings, number types and kinds of error."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

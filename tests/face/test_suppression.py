@@ -1,7 +1,5 @@
 """Non-maximum suppression agrees with its definitions and with OpenCV's."""
 
-from __future__ import annotations
-
 import time
 from typing import Any
 

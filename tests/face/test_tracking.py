@@ -1,7 +1,5 @@
 """People keep their numbers through a film."""
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

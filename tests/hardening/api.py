@@ -2,11 +2,7 @@
 
 `python -m tests.hardening.api --calls 10000000 --state FILE` makes the calls in processes of 100,000 each and writes
 what it found to FILE; started again, it goes on where it stopped. `--only N` makes call N alone, here.
-
-`tests/parity/test_sweep.py` puts calls with ordinary arguments to OpenCV, too.
 """
-
-from __future__ import annotations
 
 import argparse
 import faulthandler
@@ -62,7 +58,6 @@ def in_a_process(first: int, count: int) -> list[list[str]]:
 
 
 def main() -> int:
-    """Run from the command line; 1 where something was found."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--calls", type=lambda text: int(float(text)), default=200_000)
     parser.add_argument("--first", type=int, default=0, help="number of the first call")

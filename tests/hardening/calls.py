@@ -1,7 +1,5 @@
 """What the random calls are made of: arguments, each kind of call, and what is wanted of its answer."""
 
-from __future__ import annotations
-
 import copy
 import math
 import pickle
@@ -56,21 +54,17 @@ FINDERS = [
 
 
 class Arguments:
-    """The random arguments of one call."""
-
     def __init__(self, number: int) -> None:
         self.draw = Draw(number)
         #: How many of a hundred arguments are ugly.
         self.ugliness = self.draw.choice((0, 0, 3, 15))
 
     def some(self, *values: Any) -> Any:
-        """One of the values, or something ugly."""
         if self.ugliness and self.draw.randrange(100) < self.ugliness:
             return self.draw.choice(UGLY)
         return self.draw.choice(values)
 
     def options(self, **values: Any) -> dict[str, Any]:
-        """Some of the named arguments."""
         return {name: value() for name, value in values.items() if self.draw.random() < 0.5}
 
     def image(self) -> Any:

@@ -3,8 +3,6 @@
 `python -m tests.hardening.classroom --count 300` (half an hour on two cores).
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 import subprocess
@@ -36,7 +34,6 @@ def grade(folder: Path, exercise: Path) -> dict[str, str]:
 
 
 def main() -> None:
-    """Grade each node alone, then the class, and compare."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=300)
     parser.add_argument("--kinds", type=int, default=60, help="how many different honest nodes")
@@ -54,7 +51,7 @@ def main() -> None:
             (one / "node.py").write_text(text)
             alone.append(grade(one, exercise)["node.py"])
         folder.mkdir()
-        wanted = {}
+        wanted = dict[str, str]()
         for number in range(count):
             name, one_of_ten = f"s{number:03}.py", number % 10 == 9
             text = hostile[number // 10 % len(hostile)] if one_of_ten else honest[number % len(honest)]

@@ -3,8 +3,6 @@
 `python -m tests.hardening.files models cdr scenarios --count 10000`; recordings are in tests/ros2/test_recordings.py.
 """
 
-from __future__ import annotations
-
 import random
 import struct
 import sys
@@ -54,7 +52,6 @@ def damaged(data: bytes, draw: random.Random) -> bytes:
 
 
 def models(folder: Path) -> tuple[list[bytes], Callable[[bytes], None]]:
-    """Model files in every format."""
     hog: Any = HOGDescriptor((16, 24), (8, 8), (8, 8), (8, 8), 9)
     hog.setSVMDetector(np.random.default_rng(0).normal(0, 1, hog.getDescriptorSize() + 1).astype(np.float32))
     whole = []
@@ -74,7 +71,6 @@ def models(folder: Path) -> tuple[list[bytes], Callable[[bytes], None]]:
 
 
 def scenarios(folder: Path) -> tuple[list[bytes], Callable[[bytes], None]]:
-    """Scenarios that come along."""
     import limo_sim
 
     path = folder / "damaged.toml"

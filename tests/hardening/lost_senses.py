@@ -5,8 +5,6 @@ the start or lost after 5 s, and each topic's clock wrong before another sense d
 needs a quarter of an hour.
 """
 
-from __future__ import annotations
-
 import argparse
 import itertools
 import json
@@ -67,7 +65,6 @@ class Ride:
         self._frame: Frame | None = None
 
     def until(self, end: float, lost: tuple[str, ...] = ()) -> None:
-        """Drive on until `end` [s] without the senses that are lost."""
         heard = {topic for name, (topic, *_) in TOPICS.items() if name not in lost}
         while self.arena.time < end - 1e-9:
             for topic, make in self._outlet.new(self.arena.passed()):
@@ -117,17 +114,15 @@ def judged(ride: Ride, row: Row) -> Row:
     after = [moment for moment in ride.moments if moment.time > row.at]
     moved = [one for one in after if one.wheels > 0.01 or one.decision.twist != Twist()]
     stood_s = moved[-1].time - row.at if moved else 0.0
-    row = replace(row, stood_s=round(stood_s, 3), reason=after[-1].decision.reason)
     if needed := [TOPICS[name][1] for name in row.lost if TOPICS[name][1]]:
         limit = STANDS_S if row.at else 0.0
         wrong += [f"stands after {stood_s:.2f} s only"] if stood_s > limit + 1e-6 else []
-        silent = [
-            one for one in after if one.time > row.at + limit and any(no not in one.decision.reason for no in needed)
-        ]
+        late = [one for one in after if one.time > row.at + limit]
+        silent = [one for one in late if any(no not in one.decision.reason for no in needed)]
         wrong += [f"at {one.time:.2f} s it does not say {needed}: {one.decision.reason}" for one in silent[:1]]
         backs = [one for one in after if one.decision.twist.linear < 0 and one.time > row.at + 0.7]
         wrong += [f"backs at {one.time:.2f} s" for one in backs[:1]]
-    return replace(row, wrong=wrong)
+    return replace(row, stood_s=round(stood_s, 3), reason=after[-1].decision.reason, wrong=wrong)
 
 
 def judged_apart(ride: Ride, row: Row) -> Row:
@@ -164,20 +159,17 @@ def main() -> Iterator[str]:
     told = [json.loads(line) for line in args.rows.read_text().splitlines()]
     done = {(row["seed"], row["shifted"], row["shift"]) for row in told}
     clocks = [("", 0.0), *itertools.product(SHIFTED, SHIFTS)]
-    seeds = range(args.first, args.first + args.seeds)
-    groups = [(seed, *clock) for seed in seeds for clock in clocks if (seed, *clock) not in done]
+    groups = ((args.first + i, *clock) for i in range(args.seeds) for clock in clocks)
     with args.rows.open("a") as file:
-        for group in groups:
-            rows = rows_of(*group)
-            told += map(asdict, rows)
-            file.write("".join(json.dumps(asdict(row)) + "\n" for row in rows))
+        for group in (group for group in groups if group not in done):
+            rows = [json.dumps(asdict(row)) + "\n" for row in rows_of(*group)]
+            told += map(json.loads, rows)
+            file.writelines(rows)
             file.flush()
-    for row in told:
-        if row["wrong"]:
-            yield json.dumps(row)
+    wrong = [json.dumps(row) for row in told if row["wrong"]]
+    yield from wrong
     driven = [row["stood_s"] for row in told if row["lost"] != ["camera_info"]]
-    wrong = sum(bool(row["wrong"]) for row in told)
-    yield f"{len(told)} runs, {wrong} wrong; stood within {max(driven, default=0):.2f} s"
+    yield f"{len(told)} runs, {len(wrong)} wrong; stood within {max(driven, default=0):.2f} s"
 
 
 if __name__ == "__main__":

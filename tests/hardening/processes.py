@@ -4,8 +4,6 @@
 terminal; nothing of a killed command runs on, no broken file has its name, and `--resume` completes.
 """
 
-from __future__ import annotations
-
 import csv
 import json
 import os
@@ -94,7 +92,6 @@ LONG = (
 
 
 def material(folder: Path) -> None:
-    """Write what the commands read."""
     for number in range(PICTURES):
         write_image(folder / "in" / f"{number:02d}.png", PICTURE)
     for name in ("a", "café"):
@@ -166,7 +163,9 @@ def terminals(_: str, numbers: range, folder: Path) -> tuple[Counter[str], list[
         with _robot() if typed in AT_A_ROBOT else nullcontext():
             for how in ("", *TERMINALS):
                 place = _place(folder, f"{number} {how}".replace("/", ""))
-                done = _in_terminal(how, typed, place)
+                shell, env = ("", os.environ | ASCII) if how == "ascii" else (how, None)
+                command = ["bash", "-c", f'set -o pipefail; "$@" {shell}', "-", *LIMO_HOG, *typed.split()]
+                done = subprocess.run(command, check=False, capture_output=True, cwd=place, timeout=LATEST_S, env=env)
                 told = done.stderr.decode(errors="replace")
                 written = _written(place)
                 # How often a follower changes its mind in three seconds is the run's.
@@ -186,12 +185,6 @@ def terminals(_: str, numbers: range, folder: Path) -> tuple[Counter[str], list[
     return ends, findings
 
 
-def _in_terminal(how: str, typed: str, place: Path) -> subprocess.CompletedProcess[bytes]:
-    shell, env = ("", os.environ | ASCII) if how == "ascii" else (how, None)
-    command = ["bash", "-c", f'set -o pipefail; "$@" {shell}', "-", *LIMO_HOG, *typed.split()]
-    return subprocess.run(command, check=False, capture_output=True, cwd=place, timeout=LATEST_S, env=env)
-
-
 @contextmanager
 def _robot() -> Iterator[None]:
     command = [*LIMO_HOG, "arena", "--ros2"]
@@ -203,7 +196,6 @@ def _robot() -> Iterator[None]:
 
 
 def _running(mark: str) -> Iterator[int]:
-    """The processes whose environment has a mark."""
     for environ in Path("/proc").glob("[0-9]*/environ"):
         with suppress(OSError):
             if f"{MARK}={mark}\0".encode() in environ.read_bytes():

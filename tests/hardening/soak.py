@@ -9,8 +9,6 @@ A reading is of the memory that is a process's own, after the C library has give
 that are on their way just then, so of each minute the lowest counts: the slope is of a straight line through these.
 """
 
-from __future__ import annotations
-
 import argparse
 import asyncio
 import ctypes
@@ -87,7 +85,6 @@ def report(name: str, unit: str, times: list[float], values: list[float], of: in
 
 
 def watch_a_page(seconds: float, seed: int) -> None:
-    """Follow before an audience."""
     hours, memory = list[float](), list[float]()
     # Of the thread that simulates, so that what else the machine does counts little; without growing lists.
     took = array("d", bytes(8 * STEPS))
@@ -136,7 +133,6 @@ async def read_pages(url: str) -> None:
 
 
 def run_a_node(seconds: float, seed: int) -> None:
-    """Run a node in a process of its own, and score it as it goes."""
     rows, pid = list[tuple[float, float, float]](), list[str]()
 
     def watch(step: Step) -> None:
@@ -155,7 +151,6 @@ def run_a_node(seconds: float, seed: int) -> None:
 
 
 def detect(count: int) -> None:
-    """Search small images of changing size."""
     limo_hog.set_num_threads(2)
     hog = limo_hog.HOGDescriptor()
     hog.setSVMDetector(hog.getDefaultPeopleDetector())
@@ -174,7 +169,6 @@ def detect(count: int) -> None:
 
 
 def main() -> None:
-    """Run from the command line."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("what", choices=["view", "node", "detect", "clients"])
     parser.add_argument("--seconds", type=float, default=3600.0, help="simulated time")

@@ -1,7 +1,5 @@
 """A short form of the random calls, of which `.ci/hardening` makes more."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -1,7 +1,5 @@
 """The command line of trials: each has a folder of its own, and tells how its attempts ended and what it found."""
 
-from __future__ import annotations
-
 import argparse
 import tempfile
 import time

@@ -1,7 +1,5 @@
 """Small labelled pictures of bollards, to train on in a few seconds."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -54,16 +52,13 @@ def _bollard(canvas: Any, rng: np.random.Generator, x: float, y: float, width: f
     post, foot, bands = (0.3, 0.2, 0.9), (0.5, 0.88, 1.0), ((0.3, 0.32, 0.4), (0.3, 0.48, 0.56))
     middle = x + width / 2
     for (half, top, bottom), gray in ((post, body), (foot, body), *((band, 255 - body) for band in bands)):
-        left, right = round(middle - half * width), round(middle + half * width)
-        cv2.rectangle(
-            canvas, (left, round(y + top * height)), (right, round(y + bottom * height)), [gray] * 3, cv2.FILLED
-        )
+        left, right, colour = round(middle - half * width), round(middle + half * width), [gray] * 3
+        cv2.rectangle(canvas, (left, round(y + top * height)), (right, round(y + bottom * height)), colour, cv2.FILLED)
     head, axes = (round(middle), round(y + 0.14 * height)), (round(0.42 * width), round(0.14 * height))
     cv2.ellipse(canvas, head, axes, 0, 0, 360, [body] * 3, cv2.FILLED)
 
 
 def write(folder: Path, pictures: int, seed: int) -> None:
-    """Write pictures and their `boxes.json`."""
     folder.mkdir(parents=True, exist_ok=True)
     labels = {}
     for i in range(pictures):

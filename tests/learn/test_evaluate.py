@@ -1,7 +1,5 @@
 """`limo-hog evaluate` measures detectors on labelled pictures."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
@@ -43,8 +41,7 @@ def test_figures_come_as_json(streets: Path, answer_to: AnswerTo) -> None:
     assert model["recall_1"] == pytest.approx(found)
     low, high = model["intervals"]["recall_1"]
     assert low <= found <= high > low
-    assert sum(row["objects"] for row in model["by_height"]) == objects
-    assert model["ms"] > 0
+    assert sum(row["objects"] for row in model["by_height"]) == objects and model["ms"] > 0
 
 
 def test_others_are_compared_on_the_same_draws(streets: Path, answer_to: AnswerTo) -> None:
@@ -61,9 +58,7 @@ def test_a_detector_differs_from_itself_by_nothing(streets: Path) -> None:
         assert (difference.difference, *difference.interval) == (0, 0, 0)
 
 
-def test_the_report_is_a_page_with_the_curve_and_the_mistakes(
-    streets: Path, tmp_path: Path, answer_to: AnswerTo
-) -> None:
+def test_the_report_is_a_page_with_curve_and_mistakes(streets: Path, tmp_path: Path, answer_to: AnswerTo) -> None:
     out, heights = tmp_path / "report", ("--min-height", 64, "none")
     said = answer_to("evaluate", "opencv", streets, *heights, "--report", out, "--against", "daimler").out
     assert str(out / "index.html") in said
@@ -88,7 +83,7 @@ def test_the_report_shows_the_first_look_apart_from_the_second(streets: Path, tm
 
 
 @pytest.mark.parametrize(
-    ("change", "complaint"),
+    ("change", "told"),
     [
         (lambda folder: (folder / "0.png").unlink(), "1 of which are not there, 0.png for one"),
         (lambda folder: (folder / "0.png").write_bytes(b"no"), "0.png: not an image"),
@@ -99,13 +94,13 @@ def test_the_report_shows_the_first_look_apart_from_the_second(streets: Path, tm
     ],
 )
 def test_bad_data_is_named_in_one_line(
-    change: Any, complaint: str, streets: Path, tmp_path: Path, answer_to: AnswerTo
+    change: Any, told: str, streets: Path, tmp_path: Path, answer_to: AnswerTo
 ) -> None:
     change(streets)
     out, figures = tmp_path / "report", tmp_path / "x.json"
     code, _, err = answer_to("evaluate", "opencv", streets, "--report", out, "--json", figures)
     (shown,) = [line for line in err.splitlines() if "warning:" not in line]
-    assert code == 1 and complaint in shown and not out.exists() and not figures.exists()
+    assert code == 1 and told in shown and not out.exists() and not figures.exists()
 
 
 def test_a_curve_without_misses_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

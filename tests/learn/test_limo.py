@@ -1,7 +1,5 @@
 """Our own weights: two windows, each for its sizes, whose margins mean the same."""
 
-from __future__ import annotations
-
 import json
 from functools import partial
 from importlib.resources import files
@@ -48,9 +46,7 @@ def test_people_too_small_for_the_large_window_are_found_by_the_small_one() -> N
     assert len(limo) > len(large)
 
 
-@pytest.mark.parametrize(
-    "options", [*({"min_height": height} for height in (64, 96, 200)), {"min_height": None, "nms": "group"}]
-)
+@pytest.mark.parametrize("options", [*({"min_height": h} for h in (64, 96, 200)), {"min_height": None, "nms": "group"}])
 def test_from_64_px_on_and_in_opencvs_grouping_the_large_window_alone_is_used(options: dict[str, Any]) -> None:
     picture = street(640, 480, 3)
     first = partial(PeopleDetector, second_look=False, **options)
@@ -61,8 +57,7 @@ def test_from_64_px_on_and_in_opencvs_grouping_the_large_window_alone_is_used(op
 def test_people_of_48_px_are_found() -> None:
     picture = people_of(52)
     found = PeopleDetector(model="limo", min_height=48).detect(picture)
-    assert 46 <= found.boxes[:, 3].min() < 62
-    assert (np.diff(found.scores) <= 0).all()
+    assert 46 <= found.boxes[:, 3].min() < 62 and (np.diff(found.scores) <= 0).all()
 
 
 def test_the_cards_say_where_the_weights_come_from() -> None:

@@ -1,7 +1,5 @@
 """Training: rounds, and that the same data give the same detector."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -70,8 +68,7 @@ def test_nothing_is_held_out_where_no_object_can_be(bollards: Path, tmp_path: Pa
     (tmp_path / "boxes.json").write_text(json.dumps({name: labels[name] if name == first else [] for name in labels}))
     with pytest.warns(LabelWarning, match="objects only|--validate"):
         data = gather(Wanted((tmp_path / "boxes.json",), pictures=bollards))
-    assert data.validation == ()
-    assert measure(_train(data, replace(SMALL, rounds=0))[0], data, final=True) == {}
+    assert data.validation == () and measure(_train(data, replace(SMALL, rounds=0))[0], data, final=True) == {}
     assert len(data.negatives.paths) == 20
 
 
@@ -94,8 +91,7 @@ def test_memory_is_bounded_by_leaving_out_the_least_hard_negatives(data: Trainin
     first, free = _train(data, replace(SMALL, rounds=1))
     room = first.descriptor_bytes + 10 * 4 * (len(first.solution.coefficients) - 1)
     _, bounded = _train(data, replace(SMALL, rounds=1, most_bytes=room))
-    assert (bounded.new, bounded.left_out) == (10, free.new - 10)
-    assert bounded.descriptor_bytes <= room
+    assert (bounded.new, bounded.left_out) == (10, free.new - 10) and bounded.descriptor_bytes <= room
     found = list(Miner(data.negatives, data.shape, SMALL.mining, 0, 2).hard(first.solution.coefficients, {}))
     kept, left_out = hardest(found, 10 * found[0].descriptors[0].nbytes)
     margins = np.sort(np.concatenate([mined.margins for mined in found]))
@@ -125,8 +121,7 @@ def test_crops_are_learnt_from_once_each(crops: Path) -> None:
     (done,) = _train(data, replace(SMALL, rounds=0))
     assert done.objects == len(data.regions) - 1
     # Where crops of people have theirs; what they were cut from is not known, and so nothing can be measured.
-    assert data.shape.object_box == PERSON_BOX
-    assert measure(done, data, final=True) == {}
+    assert data.shape.object_box == PERSON_BOX and measure(done, data, final=True) == {}
 
 
 def test_a_class_that_is_missing_is_named(crops: Path) -> None:
@@ -155,8 +150,7 @@ def test_probabilities_are_those_the_scores_were_drawn_from() -> None:
     likely = 1 / (1 + np.exp(-(3 * scores - 1)))
     right = rng.random(20_000) < likely
     assert (np.abs(np.subtract(calibrate(scores, right), (3, -1))) <= (0.15, 0.08)).all()
-    assert calibration_error(likely, right) < 0.01
-    assert calibration_error(np.full(20_000, 0.9), right) > 0.3
+    assert calibration_error(likely, right) < 0.01 and calibration_error(np.full(20_000, 0.9), right) > 0.3
 
 
 @pytest.mark.parametrize("right", [[True, True], [False, False], [True, False], []])

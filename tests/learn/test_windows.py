@@ -1,7 +1,5 @@
 """Training windows are cut where they are said to lie, and as the search sees them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +13,8 @@ from limo_hog.models import PersonBox
 IMAGE = np.random.default_rng(0).integers(0, 256, (120, 160), np.uint8)
 
 
-def test_a_window_at_its_own_size_is_cut_unchanged() -> None:
+def test_a_window_at_its_own_size_is_cut_unchanged_and_mirrored_beyond_the_edges() -> None:
     assert np.array_equal(cut(IMAGE, (10, 20, 64, 96), (64, 96)), IMAGE[20:116, 10:74])
-
-
-def test_beyond_the_edges_the_picture_is_mirrored() -> None:
     around = np.pad(IMAGE, 40, mode="reflect")
     assert np.array_equal(cut(IMAGE, (-20, 60, 64, 96), (64, 96)), around[100:196, 20:84])
 
@@ -30,8 +25,7 @@ def test_another_size_is_that_of_the_searchs_levels(size: tuple[int, int]) -> No
     seen = cut(IMAGE, (0, 0, 160, 120), size)
     # At the edges one mirrors and the other repeats. OpenCV's warp has 32 steps between pixels, the resize 256.
     difference = np.abs(level.astype(int) - seen)[1:-1, 1:-1]
-    assert difference.mean() < 2
-    assert difference.max() <= 10
+    assert difference.mean() < 2 and difference.max() <= 10
 
 
 def test_the_object_stands_in_the_window_where_its_shape_says() -> None:
@@ -42,18 +36,14 @@ def test_the_object_stands_in_the_window_where_its_shape_says() -> None:
     assert region.box == pytest.approx((100 - 12.8, 50 - 12.8, 64, 128))
 
 
-def test_a_window_for_people_is_the_usual_one() -> None:
+def test_people_have_the_usual_window_small_objects_a_small_one_and_a_given_one_is_kept() -> None:
     shape = shape_for(np.full((20, 2), (41.0, 100.0)), None)
-    assert shape.size == (72, 128) or shape.size == (64, 128)
+    assert shape.size in ((72, 128), (64, 128))
     assert shape.object_box.height * shape.size[1] == pytest.approx(98, abs=3)
-
-
-def test_small_objects_have_a_small_window_and_a_given_size_is_kept() -> None:
     sizes = np.full((20, 2), (16.0, 16.0))
     assert shape_for(sizes, None).size == (40, 40)
     shape = shape_for(sizes, (64, 64))
-    assert shape.size == (64, 64)
-    assert shape.object_box == pytest.approx((12 / 64, 12 / 64, 40 / 64, 40 / 64))
+    assert shape.size == (64, 64) and shape.object_box == pytest.approx((12 / 64, 12 / 64, 40 / 64, 40 / 64))
 
 
 def test_an_object_is_taken_plain_and_jittered_both_ways_round() -> None:
@@ -71,8 +61,7 @@ def test_an_object_is_taken_plain_and_jittered_both_ways_round() -> None:
 def test_random_windows_lie_in_the_picture() -> None:
     rng = np.random.default_rng(1)
     boxes = np.array(random_boxes((300, 200), (64, 128), 200, rng))
-    assert len(boxes) == 200
-    assert (boxes[:, :2] >= 0).all()
+    assert len(boxes) == 200 and (boxes[:, :2] >= 0).all()
     assert (boxes[:, 0] + boxes[:, 2] <= 300 + 1e-9).all() and (boxes[:, 1] + boxes[:, 3] <= 200 + 1e-9).all()
     assert boxes[:, 2].min() < 70 and boxes[:, 2].max() > 95
     assert random_boxes((63, 500), (64, 128), 10, rng) == []

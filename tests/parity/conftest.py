@@ -1,7 +1,5 @@
 """OpenCV made comparable: one thread, so that its rectangles come in level order."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """What scripts written for OpenCV 4 do, to be run under OpenCV 5; `test_opencv5.py` does so."""
 
-from __future__ import annotations
-
 import sys
 import warnings
 from typing import Any
@@ -31,10 +29,14 @@ def scene(rng: np.random.Generator) -> Any:
     return image
 
 
-def the_workshops_call(image: Any) -> None:
+def people_detector() -> Any:
     hog = cv2.HOGDescriptor()
     hog.setSVMDetector(cv2.HOGDescriptor_getDefaultPeopleDetector())
-    boxes, weights = hog.detectMultiScale(image, winStride=(8, 8), padding=(4, 4), scale=1.05)
+    return hog
+
+
+def the_workshops_call(image: Any) -> None:
+    boxes, weights = people_detector().detectMultiScale(image, winStride=(8, 8), padding=(4, 4), scale=1.05)
     boxes = np.array([[x, y, x + w, y + h] for (x, y, w, h) in boxes])
     assert len(boxes) > 0 and boxes.shape == (len(weights), 4)
     for xa, ya, xb, yb in boxes:
@@ -42,9 +44,7 @@ def the_workshops_call(image: Any) -> None:
 
 
 def the_peopledetect_sample(image: Any) -> None:
-    hog = cv2.HOGDescriptor()
-    hog.setSVMDetector(cv2.HOGDescriptor_getDefaultPeopleDetector())
-    found, _w = hog.detectMultiScale(image, winStride=(8, 8), padding=(32, 32), scale=1.05)
+    found, _w = people_detector().detectMultiScale(image, winStride=(8, 8), padding=(32, 32), scale=1.05)
 
     def inside(r: Any, q: Any) -> bool:
         (rx, ry, rw, rh), (qx, qy, qw, qh) = r, q
@@ -78,15 +78,10 @@ def training_ones_own(rng: np.random.Generator, directory: str) -> None:
 
 
 def a_video_that_ends(image: Any) -> None:
-    hog = cv2.HOGDescriptor()
-    hog.setSVMDetector(cv2.HOGDescriptor_getDefaultPeopleDetector())
-    seen = 0
+    people_detector().detectMultiScale(image)
     try:
-        for frame in (image, None):
-            hog.detectMultiScale(frame)
-            seen += 1
+        people_detector().detectMultiScale(None)
     except cv2.error:
-        assert seen == 1
         return
     raise AssertionError("no error at the end")
 

@@ -1,7 +1,5 @@
 """Where photographs and OpenCV's answers to them lie: beside the checkout, for they are not ours to publish."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 SHARED = Path(__file__).parents[2].parent / "shared"

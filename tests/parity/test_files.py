@@ -1,7 +1,5 @@
 """Model files go both ways between limo-hog and OpenCV, coefficient for coefficient."""
 
-from __future__ import annotations
-
 import gzip
 from pathlib import Path
 from typing import Any
@@ -82,8 +80,7 @@ def test_an_object_is_found_by_its_name(tmp_path: Path) -> None:
     second.save(path, "second")
     path.write_text(whole + path.read_text().split("---\n")[1])
     hog = HOGDescriptor(path)
-    assert hog.winSize == (64, 128)
-    assert hog.load(path, "second") and hog.winSize == (48, 96)
+    assert hog.winSize == (64, 128) and hog.load(path, "second") and hog.winSize == (48, 96)
     with pytest.raises(ModelFormatError, match=r"third.*first, second"):
         hog.load(path, "third")
 

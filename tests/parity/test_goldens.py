@@ -1,7 +1,5 @@
 """OpenCV 4.14's recorded answers to generated images: a clone needs nothing else to prove parity."""
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from typing import Any

@@ -1,7 +1,5 @@
 """Real photographs, crops and a video against the answers of OpenCV 4.14, where `../shared` is beside the checkout."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from typing import Any

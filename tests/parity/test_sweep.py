@@ -4,8 +4,6 @@ A combination is made of its seed alone, so a failure names all that is needed t
 the first seeds; `pytest -m slow tests/parity/test_sweep.py` runs them all.
 """
 
-from __future__ import annotations
-
 import math
 import subprocess
 import sys
@@ -76,11 +74,9 @@ def same_people(s: Search) -> None:
     strong = max(float(np.sort(weights)[-40:][0]), 0.01) if len(weights) else math.inf
     if min(s.geometry[0]) >= 16 and 0 < np.count_nonzero(np.asarray(weights) >= strong) <= 60:
         groupings.append((strong, 0.1, True))
-    for hit_threshold, group_threshold, mean_shift in groupings:
-        found, expected = (
-            hog.detectMultiScale(image, hit_threshold, *arguments, group_threshold, mean_shift) for hog in hogs
-        )
-        what = f"at {hit_threshold} grouped by {group_threshold}, mean-shift {mean_shift}"
+    for hit, group, mean_shift in groupings:
+        found, expected = (hog.detectMultiScale(image, hit, *arguments, group, mean_shift) for hog in hogs)
+        what = f"at {hit} grouped by {group}, mean-shift {mean_shift}"
         same(f"rectangles {what}", found[0], expected[0], 0)
         same(f"weights {what}", found[1], expected[1], 1e-5)
 

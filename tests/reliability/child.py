@@ -1,7 +1,5 @@
 """Programs run in a process of their own: what hangs or dies there fails one test, not the run."""
 
-from __future__ import annotations
-
 import resource
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """A child forked while threads detect and describe works: no lock of ours is waited for in it."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

@@ -1,7 +1,5 @@
 """Ctrl-C ends every long call within a second."""
 
-from __future__ import annotations
-
 import os
 from itertools import product
 

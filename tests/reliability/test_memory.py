@@ -1,7 +1,5 @@
 """A size that follows from arguments and cannot be had is a MemoryError that names it, never the end of the process."""
 
-from __future__ import annotations
-
 import resource
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Threads that cannot be had are done without; a count that makes no sense is a named error."""
 
-from __future__ import annotations
-
 import os
 from itertools import product
 from pathlib import Path
@@ -51,9 +49,7 @@ def test_the_number_of_threads_is_what_was_set_and_bounded(threads_put_back: Non
         assert 1 <= limo_hog.get_num_threads() <= 1024
 
 
-@pytest.mark.parametrize(
-    ("told", "count"), [*product(["threads"], [10**400, -1]), *product(["integer"], ["2", 2.5, None])]
-)
-def test_a_number_of_threads_that_makes_no_sense_is_a_named_error(told: str, count: Any) -> None:
+@pytest.mark.parametrize(("told", "n"), [*product(["threads"], [10**400, -1]), *product(["integer"], ["2", 2.5, None])])
+def test_a_number_of_threads_that_makes_no_sense_is_a_named_error(told: str, n: Any) -> None:
     with pytest.raises(limo_hog.ParameterError, match=told):
-        limo_hog.set_num_threads(count)
+        limo_hog.set_num_threads(n)

@@ -1,7 +1,5 @@
 """One descriptor in many threads, some of which change it: every search is of one state, never a part of two."""
 
-from __future__ import annotations
-
 import sys
 import threading
 import time

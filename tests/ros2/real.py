@@ -1,7 +1,5 @@
 """ROS 2's own rclpy, in an environment of its own: a peer that is not ours."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 from pathlib import Path
@@ -14,15 +12,7 @@ needs_rclpy = pytest.mark.skipif(not PYTHON.exists(), reason="needs ROS 2's own 
 
 
 def start(program: Path, *words: str, stderr: Any = None, **environment: str) -> subprocess.Popen[str]:
-    """Start a program under rclpy; what it prints is to be read, and what it is told comes by standard input.
-
-    Its errors go where the test's go, unless to `stderr`: a program that fails must show why.
-    """
-    return subprocess.Popen(
-        [str(PYTHON), str(program), *words],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=stderr,
-        text=True,
-        env={**os.environ, "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp", **environment},
-    )
+    """Start a program under rclpy, its input and output piped; its errors are shown with the test's: they say why."""
+    command, env = [str(PYTHON), str(program), *words], os.environ | {"RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"}
+    pipe = subprocess.PIPE
+    return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=stderr, text=True, env=env | environment)

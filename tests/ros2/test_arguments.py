@@ -1,7 +1,5 @@
 """What stands after --ros-args means what it means to ROS 2; rclpy, where it is, is asked."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

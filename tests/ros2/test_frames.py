@@ -1,7 +1,5 @@
 """Where a robot's sensors sit, by the frames of /tf_static."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, replace

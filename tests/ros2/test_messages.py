@@ -1,7 +1,5 @@
 """ROS 2 messages built from arena data, compared with bytes and hashes that ROS 2 itself publishes."""
 
-from __future__ import annotations
-
 import io
 import math
 import struct
@@ -31,13 +29,15 @@ def test_a_twist_is_a_header_and_six_little_endian_doubles() -> None:
     assert messages.to_twist(sent(message)) == Twist(0.2, -0.5)
 
 
-def test_an_image_is_laid_out_as_cdr_says() -> None:
+def test_an_image_is_laid_out_as_cdr_says_and_half_of_one_refused() -> None:
     pixels = np.arange(12, dtype=np.uint8).reshape(2, 2, 3)
     data = messages.serialize(messages.image(1.5, pixels))
     frame, encoding = b"depth_link\0", b"bgr8\0"
     expected = struct.pack("<4xiII", 1, 500_000_000, len(frame)) + frame + b"\0"
     expected += struct.pack("<III", 2, 2, len(encoding)) + encoding + b"\0" + b"\0\0" + struct.pack("<II", 6, 12)
     assert data[4:] == expected[4:] + pixels.tobytes()
+    with pytest.raises(messages.MessageError, match="sensor_msgs/msg/Image"):
+        messages.deserialize(data[:40], "sensor_msgs/msg/Image")
 
 
 @pytest.mark.parametrize(
@@ -82,12 +82,6 @@ def test_an_image_that_contradicts_itself_is_refused(field: str, value: object, 
 def test_an_array_without_an_encoding_is_refused(pixels: np.ndarray) -> None:
     with pytest.raises(messages.MessageError, match="no encoding"):
         messages.image(0.0, pixels)
-
-
-def test_half_a_message_is_refused_by_name() -> None:
-    data = messages.serialize(messages.image(0.0, np.zeros((4, 4, 3), np.uint8)))
-    with pytest.raises(messages.MessageError, match="sensor_msgs/msg/Image"):
-        messages.deserialize(data[:40], "sensor_msgs/msg/Image")
 
 
 def test_a_scan_is_of_one_moment_and_comes_back_with_its_angles() -> None:
@@ -143,15 +137,12 @@ def test_a_jpeg_of_quality_90_looks_like_its_picture() -> None:
 
 def test_stamps_round_to_the_nearest_nanosecond() -> None:
     time = messages.to_time(0.1 + 0.2)
-    assert (time.sec, time.nanosec) == (0, 300_000_000)
-    assert messages.to_time(1.9999999999).sec == 2
+    assert (time.sec, time.nanosec) == (0, 300_000_000) and messages.to_time(1.9999999999).sec == 2
 
 
 def test_every_message_has_the_hash_ros_2_jazzy_gives_it() -> None:
     # from the .json files of ROS 2 Jazzy's packages
-    string, twist = (
-        messages.typestore().hash_rihs01(name) for name in ("std_msgs/msg/String", "geometry_msgs/msg/Twist")
-    )
+    string, twist = map(messages.typestore().hash_rihs01, ("std_msgs/msg/String", "geometry_msgs/msg/Twist"))
     assert string == "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
     assert twist == "RIHS01_9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a"
 
@@ -219,7 +210,7 @@ def test_a_camera_image_is_read_in_every_encoding_of_drivers(encoding: str) -> N
     message.encoding, message.data = encoding, np.ascontiguousarray(pixels).view(np.uint8).reshape(-1)
     message.step = len(message.data) // 4
     picture = picture_of(message)
-    assert (picture.dtype, picture.shape, picture.flags.c_contiguous) == (np.uint8, (4, 6, 3), True)
+    assert (str(picture.dtype), picture.shape, picture.flags.c_contiguous) == ("uint8", (4, 6, 3), True)
     assert np.abs(picture.astype(int) - wanted).max() <= 3
 
 

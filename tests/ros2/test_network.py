@@ -1,7 +1,5 @@
 """What ROS 2's environment variables mean for whom the topics reach."""
 
-from __future__ import annotations
-
 import pytest
 
 from limo_hog.ros2.network import LOOPBACK, BusError, network

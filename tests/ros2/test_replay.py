@@ -1,7 +1,5 @@
 """A replay goes by the robot's rules: which depth image belongs to a picture, and what a failing detector means."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
@@ -159,8 +157,7 @@ def test_a_recording_of_other_names_is_replayed(here: Path, monkeypatch: MonkeyP
     words += ["-r", "limo_camera/image:=rgb/image"]
     _, out, err = answer_to(*words)
     # Without a scan the robot stands, as it did when this was recorded.
-    assert json.loads(out)["linear_difference_max"] == 0.0
-    assert driver.told[0].scan is None
+    assert json.loads(out)["linear_difference_max"] == 0.0 and driver.told[0].scan is None
     assert "/r/scan_filtered (sensor_msgs/msg/LaserScan); give --ros-args -r scan:=/r/scan_filtered" in err
     assert "/r/depth (depth); give --ros-args -r limo_camera/depth/image_raw:=/r/depth" in err
     code, _, err = answer_to(*words, "-r", "scan:=scan_filtered", "-r", "limo_camera/depth/image_raw:=depth")

@@ -1,14 +1,12 @@
 """The browser lab, served from target/web, in headless Chromium."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page
-from tests.sim.view.browser import CHROMIUM, chromium
+from tests.sim.view.browser import CHROMIUM
 from tests.threads import served
 
 BUILT = Path(__file__).parents[2] / "target/web"
@@ -16,7 +14,6 @@ BUILT = Path(__file__).parents[2] / "target/web"
 
 @pytest.fixture(scope="session", autouse=True)
 def built() -> Path:
-    """Where the page is."""
     if not (BUILT / "hog-scalar.wasm").exists():
         pytest.skip("target/web is not there: .ci/web builds it")
     if CHROMIUM is None:
@@ -33,20 +30,16 @@ class Lab:
     errors: list[str] = field(default_factory=list)
 
     def text(self, name: str) -> str:
-        """What the element of this id says."""
         return self.page.locator(f"#{name}").text_content() or ""
 
     def people(self) -> int:
-        """How many people are listed."""
         return self.page.locator("#people button").count()
 
     def wait(self, condition: str) -> None:
-        """Wait until a condition in JavaScript holds."""
         self.page.wait_for_function(f"() => {condition}")
 
 
 def opened(browser: Browser | BrowserContext, address: str) -> Lab:
-    """The lab in a new tab, ready."""
     lab = Lab(browser.new_page())
     lab.page.set_default_timeout(60_000)  # the machine may be busy
     lab.page.on("request", lambda request: lab.asked.append(request.url))
@@ -60,10 +53,3 @@ def opened(browser: Browser | BrowserContext, address: str) -> Lab:
 def address(built: Path) -> Iterator[str]:
     with served(built) as address:
         yield address
-
-
-@pytest.fixture(scope="module")
-def browser(built: Path, request: pytest.FixtureRequest) -> Iterator[Browser]:
-    """A browser; a module may name its flags in `FLAGS`."""
-    with chromium(*getattr(request.module, "FLAGS", ())) as browser:
-        yield browser

@@ -1,7 +1,5 @@
 """The browser lab's page: how soon it is there, pictures and camera, the lesson, keyboard, without a network."""
 
-from __future__ import annotations
-
 import base64
 import io
 import time
@@ -29,12 +27,8 @@ def camera(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def browser(camera: Path) -> Iterator[Browser]:
-    flags = [
-        "use-fake-ui-for-media-stream",
-        "use-fake-device-for-media-stream",
-        f"use-file-for-fake-video-capture={camera}",
-    ]
-    with chromium(*(f"--{flag}" for flag in flags)) as browser:
+    fake = ("--use-fake-ui-for-media-stream", "--use-fake-device-for-media-stream")
+    with chromium(*fake, f"--use-file-for-fake-video-capture={camera}") as browser:
         yield browser
 
 
@@ -46,7 +40,6 @@ def lab(browser: Browser, address: str) -> Lab:
 
 @pytest.fixture
 def own_lab(browser: Browser, address: str) -> Iterator[Lab]:
-    """A page for one test."""
     with browser.new_context() as context:
         yield opened(context, address)
 

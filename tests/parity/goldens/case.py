@@ -1,7 +1,5 @@
 """One question to OpenCV and to limo-hog alike."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -24,8 +22,6 @@ DAIMLER = ((48, 96), (16, 16), (8, 8), (8, 8), 9)
 
 @dataclass(frozen=True)
 class Case:
-    """One call of one method on one image."""
-
     name: str
     why: str
     image: Callable[[], Image]

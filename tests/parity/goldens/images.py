@@ -7,8 +7,6 @@ wheel; none is downloaded. `answers.json` holds an MD5 of every image, so that a
 answer.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -81,16 +79,12 @@ class Figure:
     step: int = 9
 
     def capsules(self) -> list[tuple[float, ...]]:
-        limbs = [part for side in (-1, 1) for part in self._limbs(side)]
-        return [tuple(value * self.height / 96 for value in part) for part in BODY + limbs]
-
-    def _limbs(self, side: int) -> list[tuple[float, float, float, float, float]]:
-        knee, foot = side * (4.0 + self.step * 0.5), side * float(self.step)
-        return [
-            (side * 10.0, 25.0, side * 13.0, 52.0, 3.5),
-            (side * 4.0, 50.0, knee, 70.0, 5.0),
-            (knee, 70.0, foot, 92.0, 4.0),
-        ]
+        parts = [*BODY]
+        for side in (-1, 1):
+            knee, foot = side * (4.0 + self.step * 0.5), side * float(self.step)
+            parts += [(side * 10.0, 25.0, side * 13.0, 52.0, 3.5), (side * 4.0, 50.0, knee, 70.0, 5.0)]
+            parts.append((knee, 70.0, foot, 92.0, 4.0))
+        return [tuple(value * self.height / 96 for value in part) for part in parts]
 
 
 def coverage(figure: Figure, ys: range, xs: range) -> NDArray[np.float64]:
@@ -107,7 +101,6 @@ def coverage(figure: Figure, ys: range, xs: range) -> NDArray[np.float64]:
 
 
 def people(seed: int, height: int, width: int, figures: Sequence[Figure]) -> Image:
-    """Draw persons on a ground of coarse and fine noise, in colour."""
     picture = 150.0 + blocks(seed, height, width, size=24)[:, :, None] / 8 + noise(seed + 1, height, width, 3) / 16
     for figure in figures:
         reach = figure.height // 4
@@ -120,5 +113,4 @@ def people(seed: int, height: int, width: int, figures: Sequence[Figure]) -> Ima
 
 
 def gray(image: Image) -> Image:
-    """Keep the middle channel."""
     return np.ascontiguousarray(image[:, :, 1])

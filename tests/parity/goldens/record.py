@@ -4,8 +4,6 @@ A new case goes into `varied.py`. The digests are those of an x86-64 CPU with AV
 few gradients differently.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import multiprocessing
@@ -25,7 +23,6 @@ SAMPLES = 12
 
 
 def digest(array: Any) -> str:
-    """MD5 of the values in C order."""
     return hashlib.md5(np.ascontiguousarray(array).tobytes()).hexdigest()
 
 
@@ -58,7 +55,6 @@ def recorded(case: Case) -> dict[str, Any]:
 
 
 def recorded_with(clip: float) -> dict[str, Any]:
-    """Record the cases of one `L2HysThreshold`."""
     import cv2
 
     cv2.setNumThreads(1)  # with more, rectangles come in another order each time
@@ -74,14 +70,11 @@ def opencv_answers() -> dict[str, Any]:
     return plain
 
 
-def write(answers: dict[str, Any]) -> None:
-    lines = [f"{json.dumps(name)}: {json.dumps(answer, separators=(',', ':'))}" for name, answer in answers.items()]
-    ANSWERS.write_text("{\n" + ",\n".join(lines) + "\n}\n")
-
-
 if __name__ == "__main__":
     import cv2
 
     if not cv2.__version__.startswith("4.14."):
         sys.exit(f"OpenCV is {cv2.__version__}, but the answers are those of 4.14: install opencv-python-headless 4.14")
-    write(opencv_answers())
+    told = opencv_answers().items()
+    lines = [f"{json.dumps(name)}: {json.dumps(answer, separators=(',', ':'))}" for name, answer in told]
+    ANSWERS.write_text("{\n" + ",\n".join(lines) + "\n}\n")

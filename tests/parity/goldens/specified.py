@@ -1,7 +1,5 @@
 """Every quirk that was found in OpenCV 4.14, once."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any

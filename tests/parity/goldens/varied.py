@@ -1,7 +1,5 @@
 """Searches drawn at random, edges of images, and drawn people whose search is varied one option at a time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial

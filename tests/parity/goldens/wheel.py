@@ -1,7 +1,5 @@
 """Prove an installed wheel where there is no OpenCV: `python -m tests.parity.goldens.wheel` needs numpy alone."""
 
-from __future__ import annotations
-
 import json
 import sys
 

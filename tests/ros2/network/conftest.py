@@ -1,7 +1,5 @@
 """A ROS domain for every worker."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

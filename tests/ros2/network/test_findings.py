@@ -1,7 +1,5 @@
 """What the follower publishes: messages as planners and costmaps read them, with the bytes of Cyclone DDS's encoder."""
 
-from __future__ import annotations
-
 import math
 import threading
 from functools import cache
@@ -46,13 +44,6 @@ MESSAGES = {
 }
 
 
-def cyclone(message: Any) -> Any:
-    """Return a message as Cyclone's own struct."""
-    return cyclone_type(message.__msgtype__)(
-        **{field.name: as_taken(getattr(message, field.name)) for field in messages.fields_of(message.__msgtype__)}
-    )
-
-
 @cache
 def cyclone_type(name: str) -> Any:
     generic: Any = types
@@ -65,10 +56,14 @@ def cyclone_type(name: str) -> Any:
     return make_idl_struct(name.replace("/", "_"), name, fields)
 
 
-def as_taken(value: Any) -> Any:
+def cyclone(value: Any) -> Any:
+    """A message as Cyclone's own struct, with what it holds."""
     if isinstance(value, list | np.ndarray):
-        return [as_taken(one) for one in value]
-    return cyclone(value) if hasattr(value, "__msgtype__") else value
+        return [cyclone(one) for one in value]
+    if not hasattr(value, "__msgtype__"):
+        return value
+    fields = messages.fields_of(value.__msgtype__)
+    return cyclone_type(value.__msgtype__)(**{one.name: cyclone(getattr(value, one.name)) for one in fields})
 
 
 @pytest.mark.parametrize("name", MESSAGES)

@@ -1,7 +1,5 @@
 """Peers that are not ours, Cyclone DDS's C library and Fast DDS, understand us and we them."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
@@ -39,7 +37,6 @@ BUILDS = {
 
 
 def built(kind: str, folder: Path, source: str) -> Path:
-    """Build a peer."""
     packages, commands = BUILDS[kind]
     shutil.copy(HERE / "ros.idl", folder)
     for command in (command.replace("SOURCE", str(HERE / source)).split() for command in commands):

@@ -1,7 +1,5 @@
 """ROS 2's own rclpy, with Fast DDS and no settings, hears the arena, sees our nodes, and is followed as a robot."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,5 +1,7 @@
 """`detect` of films and live sources: numbered people, the live page, sources that do not wait or break off."""
 
+from __future__ import annotations
+
 import csv
 import json
 import os
@@ -18,12 +20,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 from pytest import MonkeyPatch
-<<<<<<< HEAD
 from tests.cli.material import LIMO_HOG, PICTURE, AnswerTo, film_of, frames_of, lines_of
-=======
-from tests.answers import AnswerTo
-from tests.cli.material import LIMO_HOG, PICTURE, film_of, frames_of, lines_of
->>>>>>> part-ta
 from tests.sim.view.browser import CHROMIUM, chromium
 
 from limo_hog import Detections, PeopleDetector
@@ -65,15 +62,9 @@ with video_writer(pathlib.Path(sys.argv[1]), fps=25) as write:
 
 
 def test_a_film_is_of_the_same_bytes_whatever_was_in_memory(tmp_path: Path) -> None:
-<<<<<<< HEAD
     for junk in ("1", "200"):  # what glibc fills memory with that was never written
         command = [sys.executable, "-c", _WRITTEN, str(tmp_path / junk)]
         subprocess.run(command, check=True, env=os.environ | {"MALLOC_PERTURB_": junk})
-=======
-    for junk in ("1", "200"):  # with which glibc fills memory that was never written
-        environment = os.environ | {"MALLOC_PERTURB_": junk}
-        subprocess.run([sys.executable, "-c", _WRITTEN, str(tmp_path / junk)], check=True, env=environment)
->>>>>>> part-ta
     assert (tmp_path / "1").read_bytes() == (tmp_path / "200").read_bytes()
 
 
@@ -99,18 +90,10 @@ def play(monkeypatch: MonkeyPatch, *captures: Mock) -> None:
     monkeypatch.setattr(reading, "RETRY_AFTER_S", (0.01, 0.02, 0.04))
 
 
-<<<<<<< HEAD
 @pytest.mark.parametrize("frames", [75, pytest.param(7500, marks=[pytest.mark.slow, pytest.mark.timeout(600)])])
 def test_a_detector_slower_than_a_camera_gets_its_newest_frame(
     frames: int, monkeypatch: MonkeyPatch, answer_to: AnswerTo
 ) -> None:
-=======
-SLOW = pytest.param(7500, marks=[pytest.mark.slow, pytest.mark.timeout(600)])
-
-
-@pytest.mark.parametrize("frames", [75, SLOW])
-def test_a_slow_detector_gets_the_newest_frame(frames: int, monkeypatch: MonkeyPatch, answer_to: AnswerTo) -> None:
->>>>>>> part-ta
     camera, behind = capture(frames, period_s=0.04), []
 
     def slow(_: PeopleDetector, image: np.ndarray[Any, Any]) -> Detections:
@@ -120,37 +103,22 @@ def test_a_slow_detector_gets_the_newest_frame(frames: int, monkeypatch: MonkeyP
 
     monkeypatch.setattr(PeopleDetector, "detect", slow)
     play(monkeypatch, camera)
-<<<<<<< HEAD
     code, _, said = answer_to("detect", 0)
     assert code == 0 and f"{frames - len(behind)} frames dropped" in said
     assert max(behind) <= 2
     assert len(behind) < frames / 3
-=======
-    code, _, err = answer_to("detect", 0)
-    assert code == 0 and max(behind) <= 2 and len(behind) < frames / 3
-    assert f"{frames - len(behind)} frames dropped" in err
->>>>>>> part-ta
 
 
 @pytest.mark.parametrize(
     ("last", "code", "said"), [(4, 0, "7 frames; trying again for 0.07 s"), (0, 1, "3 frames, and did not come back")]
 )
 def test_a_stream_that_breaks_off_is_one_line_and_comes_back_or_fails(
-<<<<<<< HEAD
     last: int, code: int, said: str, monkeypatch: MonkeyPatch, tmp_path: Path, answer_to: AnswerTo
 ) -> None:
     play(monkeypatch, *map(capture, (3, 0, 0, last)))
     answer = answer_to("detect", "rtsp://camera/live", "--out", tmp_path, "--json", "-")
     numbers = [result["frame"] for result in lines_of(answer.out)]
     assert answer.code == code and numbers == sorted(set(numbers)) and numbers[-1] == 2 + last
-=======
-    then: tuple[int, ...], code: int, said: str, monkeypatch: MonkeyPatch, tmp_path: Path, answer_to: AnswerTo
-) -> None:
-    play(monkeypatch, *map(capture, (3, *then)))
-    shown = answer_to("detect", "rtsp://camera/live", "--out", tmp_path, "--json", "-")
-    numbers = [result["frame"] for result in lines_of(shown.out)]
-    assert shown.code == code and numbers == sorted(set(numbers)) and numbers[-1] == 2 + sum(then)
->>>>>>> part-ta
     assert frames_of(tmp_path / "live.mp4") == len(numbers)
     told = [line for line in answer.err.splitlines() if "broke off" in line]
     lines = ("3 frames; trying again for 0.07 s", said)

@@ -20,7 +20,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 from pytest import MonkeyPatch
-from tests.cli.material import LIMO_HOG, PICTURE, AnswerTo, film_of, frames_of, lines_of
+from tests.answers import AnswerTo
+from tests.cli.material import LIMO_HOG, PICTURE, film_of, frames_of, lines_of
 from tests.sim.view.browser import CHROMIUM, chromium
 
 from limo_hog import Detections, PeopleDetector

@@ -292,6 +292,9 @@ def test_a_person_in_other_clothes_is_not_the_lost_one_until_long_after() -> Non
     world = World()
     state = lost(world)
     parted = 4.0
+    # One box tells the colours, and not yet that it is another.
+    state = CONTROLLER.step(seen_in(world.observe(), GREEN), state).state
+    world.time += world.period
     while world.time < parted + CONTROLLER.selection.reidentify_s - 0.1:
         decision = CONTROLLER.step(seen_in(world.observe(), GREEN), state)
         state = decision.state

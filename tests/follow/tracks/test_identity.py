@@ -56,13 +56,13 @@ def test_a_person_who_is_hardly_likely_is_known_again_while_their_legs_go_on() -
     assert known.of(1) > 0.8
 
 
-def test_a_box_beside_another_person_tells_nothing_for_it_may_show_either() -> None:
-    for apart, low, high in ((0.4, 0.6, 1.0), (0.8, 0.0, 0.2)):
+def test_a_box_in_anothers_clothes_tells_so_beside_that_person_too() -> None:
+    for apart in (0.4, 0.8):
         known = followed()
         for frame in range(11, 26):
             stamp = 0.1 * frame
             known = IDENTITY.update(known, at(stamp, person(1, stamp, clothes=IN_GREEN), person(2, stamp, apart)))
-        assert low <= known.of(1) <= high
+        assert known.of(1) < 0.2
 
 
 def test_two_alike_side_by_side_hardly_change_places_while_each_has_legs_that_go_on() -> None:
@@ -178,23 +178,30 @@ def test_one_box_never_decides_and_a_track_that_ends_is_doubted_more_and_more() 
     assert 0.5 < doubts[-1] < 0.9
 
 
-def test_a_person_who_is_likelier_known_as_another_is_compared_with_that_one() -> None:
-    # Both wear red: the shirt tells nothing.
-    unsure = replace(followed(), chances=((1, 0.5),))
-    known = replace(unsure, others=(Traits(7, IN_RED, WINDOW),))
+def test_where_another_wears_the_same_the_clothes_tell_nothing() -> None:
+    known = replace(followed(), chances=((1, 0.5),), others=(Traits(7, IN_RED, WINDOW),))
     assert IDENTITY.update(known, at(1.1, person(1, 1.1, age=1))).of(1) == pytest.approx(0.5, abs=0.01)
-    # A track that was another person before is compared with that one alone.
-    known = replace(unsure, others=(Traits(7, IN_RED, WINDOW), Traits(1, IN_RED + 9.0, 2 * WINDOW)))
-    assert IDENTITY.update(known, at(1.1, person(1, 1.1, age=1))).of(1) > 0.8
 
 
-def test_of_many_who_were_about_a_track_that_begins_is_the_person_less_likely() -> None:
-    chances = []
-    for others in (0, 1, 6):
-        known = replace(followed(), others=tuple(Traits(100 + index, None, WINDOW) for index in range(others)))
-        begun = replace(person(2, 5.0, clothes=None), tall=None)
-        chances.append(IDENTITY.update(known, at(5.0, begun)).of(2))
-    assert chances == pytest.approx([1 / 2, 1 / 3, 1 / 8], abs=1e-3)
+def test_the_less_the_boxes_of_one_person_vary_the_more_a_small_difference_tells() -> None:
+    dusk = IN_RED - 0.8
+    for variance, low, high in ((1.0, 0.6, 1.0), (0.16, 0.0, 0.2)):
+        known = replace(followed(), chances=((1, 0.5),))
+        one = replace(person(1, 1.1, clothes=dusk, age=1), tall=None)
+        assert low < IDENTITY.update(known, replace(at(1.1, one), variance=variance)).of(1) < high
+
+
+def test_others_are_learnt_only_beside_the_person_who_may_else_be_one_of_them() -> None:
+    for beside, learnt in ((person(1, 5.0),), [2]), ((), []):
+        known = replace(followed(), chances=((1, 1.0), (2, 0.0)))
+        known = IDENTITY.update(known, at(5.0, *beside, person(2, 5.0, 1.5, IN_GREEN)))
+        assert [one.number for one in known.others] == learnt
+
+
+def test_another_is_learnt_by_the_boxes_and_not_by_what_the_track_wore_before() -> None:
+    hijacked = replace(person(2, 1.1, 1.5, IN_RED), worn=IN_GREEN)
+    (other,) = IDENTITY.update(followed(), at(1.1, person(1, 1.1), hijacked)).others
+    assert other.clothes == pytest.approx(IN_GREEN)
 
 
 def test_where_the_person_is_and_what_they_wear_is_learnt_where_it_is_sure() -> None:

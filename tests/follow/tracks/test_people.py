@@ -189,6 +189,4 @@ def test_two_boxes_on_one_person_are_within_half_a_metre_and_in_the_same_clothes
 def test_boxes_go_to_confirmed_people_first_and_then_to_who_fits_best() -> None:
     sure, new = a_person(1, 2.0, 0.05), replace(a_person(2, 2.0, 0.0), confirmed=False)
     assert pairs((new, sure), box(2.0, 0.01)) == {1: 0}
-    assert TRACKER.association.pair((sure,), [box(2.0)], POSE, NOISE, flat={0}) == {}
-    assert TRACKER.association.pair((new,), [box(2.0)], POSE, NOISE, flat={0}) == {0: 0}
     assert TRACKER.association.pair((sure, new), [box(2.0)], POSE, NOISE, others={(0, 0)}) == {1: 0}

@@ -45,7 +45,7 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_film_is_h264_with_a_frame_for_each_of_the_cameras_and_the_figure_is_drawn(kept: Path) -> None:
+def test_the_film_is_h264_of_all_the_cameras_frames_and_the_figure_is_drawn(kept: Path) -> None:
     frames = json.loads((kept / "card.json").read_text())["frames"]
     with av.open(kept / "run.mp4") as container:
         stream = container.streams.video[0]

@@ -40,4 +40,4 @@ def test_a_command_imports_the_libraries_that_it_needs(typed: str, imported: set
     (here / "broken.jpg").write_bytes(b"no picture")
     code = "import sys; from limo_hog.cli.main import main; main(); print(*sys.modules, sep='\\n')"
     done = subprocess.run([sys.executable, "-c", code, *typed.split()], check=True, capture_output=True, text=True)
-    assert {"cv2", "rich", "limo_sim", "aiohttp"} & {*done.stdout.splitlines()} == imported
+    assert {"cv2", "rich", "av", "limo_sim", "aiohttp"} & {*done.stdout.splitlines()} == imported

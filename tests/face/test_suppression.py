@@ -67,7 +67,7 @@ def test_thousands_of_hits_are_suppressed_at_once() -> None:
     assert time.process_time() - start < 0.2
 
 
-def test_boxes_that_overlap_vote_on_where_a_person_stands_the_more_the_better_they_are() -> None:
+def test_boxes_that_overlap_vote_on_where_a_person_stands_the_better_the_more() -> None:
     boxes = np.array([[0, 0, 40, 80], [8, 4, 40, 80], [200, 0, 40, 80]], float)
     equal = voted(boxes, np.array([1.0, 1.0, 3.0]), np.array([2, 0]), 0.5, 0.3)
     np.testing.assert_allclose(equal, [[200, 0, 40, 80], [4, 2, 40, 80]])

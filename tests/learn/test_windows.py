@@ -36,7 +36,7 @@ def test_the_object_stands_in_the_window_where_its_shape_says() -> None:
     assert region.box == pytest.approx((100 - 12.8, 50 - 12.8, 64, 128))
 
 
-def test_people_have_the_usual_window_small_objects_a_small_one_and_a_given_one_is_kept() -> None:
+def test_people_have_the_usual_window_small_objects_a_small_one() -> None:
     shape = shape_for(np.full((20, 2), (41.0, 100.0)), None)
     assert shape.size in ((72, 128), (64, 128))
     assert shape.object_box.height * shape.size[1] == pytest.approx(98, abs=3)

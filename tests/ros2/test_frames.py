@@ -41,7 +41,7 @@ def test_sensors_sit_where_their_frames_do_above_the_floor(camera: str) -> None:
     assert told == pytest.approx((0.2, 0.25, -0.1, 0.12, math.pi))
 
 
-def test_without_a_footprint_heights_count_from_the_base_and_what_the_robots_file_says_stays() -> None:
+def test_heights_count_from_the_base_without_a_footprint_and_a_files_stay() -> None:
     robot, _ = mounts({k: v for k, v in TREE.items() if k != "base_link"}).applied(LIMO, "base_link", "camera", "")
     assert robot.camera_z == pytest.approx(0.15)
     robot, _ = mounts().applied(replace(LIMO, camera_z=0.4), "base_link", "camera", "laser")

@@ -1,7 +1,5 @@
 """`detect` of films and live sources: numbered people, the live page, sources that do not wait or break off."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

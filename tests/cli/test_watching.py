@@ -1,7 +1,5 @@
 """What `follow` keeps of a run is whole, readable by others, and gives the same detections again."""
 
-from __future__ import annotations
-
 import asyncio
 import errno
 import json

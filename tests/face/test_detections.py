@@ -1,7 +1,5 @@
 """Detections are indexed, drawn, and told as probabilities."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

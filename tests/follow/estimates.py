@@ -1,7 +1,5 @@
 """Estimates, made up: what a track's covariance is that textbooks write as a matrix."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

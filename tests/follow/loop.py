@@ -1,7 +1,5 @@
 """The follower's loop with a detector and a driver that are made up. Tests call `Follower` here alone."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

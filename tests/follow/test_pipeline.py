@@ -1,7 +1,5 @@
 """The follower's loop: detect in the region, observe, decide behind the safety layer, keep region and state."""
 
-from __future__ import annotations
-
 import pytest
 from tests.follow.loop import DEPTH, FOCAL_PX, IMAGE, REGION, SENSORS, Loop
 from tests.follow.views import flat, scan, scan_of, there

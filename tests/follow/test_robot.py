@@ -1,7 +1,5 @@
 """A robot is data: read from a file, and taken by the follower for guard and controller alike."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import replace

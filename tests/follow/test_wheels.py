@@ -1,7 +1,5 @@
 """Commands that the wheels can carry out: the turn first, at an acceleration that is learnt."""
 
-from __future__ import annotations
-
 import pytest
 
 from limo_hog.follow.control.wheels import Wheels

@@ -1,7 +1,5 @@
 """What a robot would see, made up: observations for controllers, without a simulator."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 from typing import TypeVar

@@ -1,8 +1,7 @@
 """A robot that lacks or loses senses, in `followable` with two walls, as over ROS 2: it must stand, and say which.
 
-`python -m tests.hardening.lost_senses --seeds 20 --rows FILE` plays every case: each subset of the senses missing from
-the start or lost after 5 s, and each topic's clock wrong before another sense dies. It goes on where FILE ends; a core
-needs a quarter of an hour.
+`python -m tests.hardening.lost_senses --seeds 20 --rows FILE` plays each subset of the senses missing from the start or
+lost after 5 s, and each topic's clock wrong before another sense dies, from where FILE ends: .25 h on a core.
 """
 
 import argparse

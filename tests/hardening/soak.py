@@ -1,12 +1,8 @@
 """Long runs whose memory, descriptors and times must stay flat.
 
-`python -m tests.hardening.soak view --seconds 3600` follows for so much simulated time, as fast as it can, before 20
-clients of the page, 5 of which stop reading; `node` in its place runs a node that only drives, as `limo-hog run` does;
-`python -m tests.hardening.soak detect --count 1000000` searches images of changing size. Each prints what it measured
-every now and then, and at the end the slope.
-
-A reading is of the memory that is a process's own, after the C library has given back what is free. It holds pictures
-that are on their way just then, so of each minute the lowest counts: the slope is of a straight line through these.
+`python -m tests.hardening.soak view --seconds 3600` follows in simulated time before 20 clients of the page, 5 of which
+stop reading; `node` runs a node that only drives; `detect --count 1000000` searches images of changing size. The slope
+printed at the end is of a straight line through each minute's lowest reading: others hold pictures on their way.
 """
 
 import argparse

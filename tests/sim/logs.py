@@ -1,7 +1,5 @@
 """Logs of runs: made up, which are the scorer's input; and of the arena, kept without their pictures."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace

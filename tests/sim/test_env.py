@@ -1,7 +1,5 @@
 """`LimoFollow-v1` keeps Gymnasium's rules, its reward has a slope everywhere, and its state is what HOG would tell."""
 
-from __future__ import annotations
-
 import cmath
 import math
 import warnings

@@ -1,7 +1,5 @@
 """The tracking controller driving a robot of a made-up world, and states of it that are made up."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

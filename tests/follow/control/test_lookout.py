@@ -1,7 +1,5 @@
 """Looking for a lost person: where they can be, what shows that they are not, and the place to look from."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 

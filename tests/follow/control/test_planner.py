@@ -1,7 +1,5 @@
 """Which command costs least: what each critic is for, and how another is added."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 from types import FunctionType

@@ -1,7 +1,5 @@
 """Which person to follow: both sides of every probability and time that decides it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

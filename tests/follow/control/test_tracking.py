@@ -1,7 +1,5 @@
 """The tracking controller finds, follows, coasts, loses and finds again, and stays with whom it began with."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

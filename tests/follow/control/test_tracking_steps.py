@@ -1,7 +1,5 @@
 """One step of the tracking controller from states that are made up: distance kept, region, map, ways."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

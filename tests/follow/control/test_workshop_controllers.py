@@ -1,7 +1,5 @@
 """The workshop's two controllers do what the workshop says, number for number."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

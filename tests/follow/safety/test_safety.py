@@ -1,7 +1,5 @@
 """No controller passes the safety layer, bad input stops the robot within one period, and ground seen is geometry."""
 
-from __future__ import annotations
-
 import cmath
 import math
 from dataclasses import dataclass, replace

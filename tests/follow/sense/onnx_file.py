@@ -4,8 +4,6 @@ It averages 32 x 32 px cells of a 640 x 640 image and calls every dark cell a pe
 output is laid out as YOLOv8's: (1, 5, 400).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

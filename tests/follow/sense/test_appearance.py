@@ -1,7 +1,5 @@
 """Clothes are told apart by their colours, in whatever light, and not by how a box happens to sit."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray

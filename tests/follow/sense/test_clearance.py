@@ -1,7 +1,5 @@
 """Free space: what is counted as an obstacle, how far the robot may drive, and how fast."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

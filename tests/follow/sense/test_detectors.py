@@ -1,7 +1,5 @@
 """HOG, OpenCV's HOG and a network stand behind one protocol, on whole images and on parts of them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """How far a box is by the depth image, where pixels are unknown and the image ends; and the part searched next."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The map of the ground, where a lost person may be, and ways there; compared with geometry."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """People who are known well and boxes on them, made up."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

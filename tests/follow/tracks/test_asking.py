@@ -1,7 +1,5 @@
 """Whom a word or a number asks for."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

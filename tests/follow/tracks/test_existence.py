@@ -1,7 +1,5 @@
 """Is it a person? Log-odds by Bayes' rule, the recall that is learnt, and boxes that stand out from nothing."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

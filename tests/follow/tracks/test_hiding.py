@@ -1,7 +1,5 @@
 """People out of sight: remembered where they were, and taken to walk on from there."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Which track is the person followed: by way, clothes and stature together, with doubt where they do not tell."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest
@@ -22,10 +20,13 @@ def followed() -> Likeness:
     return known
 
 
-def test_a_track_that_goes_over_to_another_shirt_is_not_the_person_any_more() -> None:
+@pytest.mark.parametrize("beside", [(), (0.4,)])
+def test_a_track_that_goes_over_to_another_shirt_is_not_the_person_any_more(beside: tuple[float, ...]) -> None:
     known = followed()
     for frame in range(11, 26):
-        known = IDENTITY.update(known, at(0.1 * frame, person(1, 0.1 * frame, clothes=IN_GREEN, tall=0.95 * WINDOW)))
+        stamp = 0.1 * frame
+        others = [person(2, stamp, off) for off in beside]
+        known = IDENTITY.update(known, at(stamp, person(1, stamp, clothes=IN_GREEN, tall=0.95 * WINDOW), *others))
     assert known.of(1) < 0.1
     # What the other person wears was not learnt.
     assert known.traits.clothes is not None
@@ -54,15 +55,6 @@ def test_a_person_who_is_hardly_likely_is_known_again_while_their_legs_go_on() -
         one = person(1, 0.1 * frame)
         known = IDENTITY.update(known, replace(at(0.1 * frame, one), movers=(legs(one, one.seen),)))
     assert known.of(1) > 0.8
-
-
-def test_a_box_in_anothers_clothes_tells_so_beside_that_person_too() -> None:
-    for apart in (0.4, 0.8):
-        known = followed()
-        for frame in range(11, 26):
-            stamp = 0.1 * frame
-            known = IDENTITY.update(known, at(stamp, person(1, stamp, clothes=IN_GREEN), person(2, stamp, apart)))
-        assert known.of(1) < 0.2
 
 
 def test_two_alike_side_by_side_hardly_change_places_while_each_has_legs_that_go_on() -> None:
@@ -117,15 +109,10 @@ def test_what_little_the_light_makes_of_the_clothes_of_two_alike_does_not_add_up
     assert known.of(2) < 0.2
 
 
-def test_a_track_that_begins_while_the_person_is_measured_is_another() -> None:
+def test_a_track_that_begins_beside_the_person_or_too_far_off_to_be_walked_to_is_another() -> None:
     known = IDENTITY.update(followed(), at(1.1, person(1, 1.1), person(2, 1.1, 0.8, age=1)))
-    assert known.of(2) == 0.0
-    assert known.of(1) > 0.99
-
-
-def test_a_track_too_far_off_to_be_walked_to_is_another() -> None:
-    known = IDENTITY.update(followed(), at(2.0, person(2, 2.0, 4.0, age=1)))
-    assert known.of(2) == 0.0
+    assert (known.of(1) > 0.99, known.of(2)) == (True, 0.0)
+    assert IDENTITY.update(followed(), at(2.0, person(2, 2.0, 4.0, age=1))).of(2) == 0.0
 
 
 def test_the_stature_tells_apart_people_in_one_kind_of_clothes() -> None:

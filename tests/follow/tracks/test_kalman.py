@@ -1,7 +1,5 @@
 """The track is a Kalman filter: it agrees with the plain equations, and the robot's own motion drops out."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

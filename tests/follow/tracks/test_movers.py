@@ -1,7 +1,5 @@
 """People whom the lidar alone shows: groups of returns that move."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

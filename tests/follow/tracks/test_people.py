@@ -1,7 +1,5 @@
 """Whose box is whose: by where people are, how sure that is, how large they are and what they wear."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Where the robot was, or will be, at an instant between two odometry readings."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """From frame to frame: what is kept for how long, what one box changes, and whose the legs in the scan can be."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

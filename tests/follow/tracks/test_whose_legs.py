@@ -1,7 +1,5 @@
 """Whose legs the lidar shows: a person's whom the camera shows too, or has shown."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """People whom the lidar shows, made up: returns of their legs, and what moves there."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """People of whom clothes, stature and legs are known, made up: for who is the person followed."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,10 +1,7 @@
-"""Images made from numbers alone, the same on every machine.
+"""Images made from numbers alone, the same on every machine: `answers.json` holds an MD5 of each.
 
-Noise is `numpy.random.default_rng(seed).integers(...)`. NumPy promises the stream of the bit generator (PCG64), though
-not formally what `integers` makes of it; that has not changed since it appeared in NumPy 1.17. Drawings use +, -, × and
-÷ of float64 on single values, which IEEE 754 rounds alike everywhere. The photographs are files of scikit-image's
-wheel; none is downloaded. `answers.json` holds an MD5 of every image, so that another image is not taken for another
-answer.
+Noise is the bit generator's (PCG64), whose stream NumPy promises. Drawings use +, -, × and ÷ of single float64 values,
+which IEEE 754 rounds alike everywhere. The photographs are files of scikit-image's wheel; none is downloaded.
 """
 
 from collections.abc import Sequence

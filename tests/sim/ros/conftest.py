@@ -1,7 +1,5 @@
 """Runs of nodes against small arenas."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Nodes written as students write them, and small arenas to run them in."""
 
-from __future__ import annotations
-
 import sys
 import textwrap
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """What a camera frame takes on its way through `limo-hog run`: calls of functions, and copies of the image."""
 
-from __future__ import annotations
-
 import json
 import socket
 import sys

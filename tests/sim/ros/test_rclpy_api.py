@@ -1,7 +1,5 @@
 """Every public name of rclpy, as recorded from its sources, is there with its parameters or is refused by name."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """`limo-hog run`: ordinary nodes in lock step with the arena, and what happens to bad ones."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import time

@@ -1,7 +1,5 @@
 """A node in a process of its own: however it ends, there are a score card and one line of why; processes that wait."""
 
-from __future__ import annotations
-
 import gc
 import re
 import subprocess

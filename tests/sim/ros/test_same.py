@@ -1,7 +1,5 @@
 """A program does the same, line by line, under ROS 2's own rclpy and under ours."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """Threads, services and rates of a script in lock step; where ROS would wait for ever, the error says why."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

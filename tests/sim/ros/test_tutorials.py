@@ -1,7 +1,5 @@
 """Nodes in the style of the public tutorials run unmodified, and are told of topics and qualities that do not match."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """One seed, one world: whoever looks, whenever, in whichever process."""
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """Pure pursuit drives the arc to the last sighting; a policy does what its network says; wrong names are refused."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

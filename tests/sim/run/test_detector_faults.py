@@ -1,7 +1,5 @@
 """`[detector]` and `[vary]`: as much of each as is asked for, the same for the same seed, wherever a run begins."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from itertools import groupby

@@ -1,7 +1,5 @@
 """Runs in the arena: closed loop, the same for the same seed, and safe when the detector is not."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import time

@@ -1,7 +1,5 @@
 """Labelled frames: boxes lie around what is seen, the same seed gives the same pictures."""
 
-from __future__ import annotations
-
 import json
 import math
 import subprocess

@@ -1,7 +1,5 @@
 """The arena's robot is the one of a file: its camera, its lidar, its outline, its wheels."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A score card says of a made-up log what anybody can count."""
 
-from __future__ import annotations
-
 import json
 import math
 import tracemalloc

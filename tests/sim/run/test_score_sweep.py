@@ -1,7 +1,5 @@
 """Many runs: cards belong to their runs and are summed up by textbook; workers end in time; suites are frozen."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import math

@@ -1,7 +1,5 @@
 """OpenCV's own HOG sees the person as it sees people, and sees nobody where nobody is."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

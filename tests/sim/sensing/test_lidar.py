@@ -1,7 +1,5 @@
 """The lidar measures what a ray in the physics engine meets."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The lens bends as OpenCV's model says; the shutter blurs and leans what moves; the light changes."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

@@ -1,7 +1,5 @@
 """The camera sees what rays solved one by one see; the canvas draws solids where a formula says they are."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import math

@@ -1,7 +1,5 @@
 """The system's Chromium, driven by Playwright, whose own browsers would be a download."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Clients of the live page that behave badly, as plain sockets."""
 
-from __future__ import annotations
-
 import socket
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager

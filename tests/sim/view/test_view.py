@@ -1,7 +1,5 @@
 """The live page's pace, parameters and numbers; and the figure of many runs, on which everything can be read."""
 
-from __future__ import annotations
-
 import math
 import re
 import socket

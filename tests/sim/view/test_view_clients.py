@@ -1,7 +1,5 @@
 """Clients of the live page: strangers are refused by name, and who does not read is dropped; nothing is said of it."""
 
-from __future__ import annotations
-
 import asyncio
 import dataclasses
 import gc

@@ -1,7 +1,5 @@
 """The page of a running episode in a real browser, and whom it is told to follow; pictures are kept in `out/view/`."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import replace
 from pathlib import Path

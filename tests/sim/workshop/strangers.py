@@ -1,7 +1,5 @@
 """Right nodes, and others with one mistake each: three by people who knew the tutorials alone, and changes of nodes."""
 
-from __future__ import annotations
-
 import csv
 import re
 from pathlib import Path

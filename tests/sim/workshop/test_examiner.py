@@ -1,7 +1,5 @@
 """The examiner is fair: a fault ends its scene alone, evidence is true, and an exercise can be a lecturer's own."""
 
-from __future__ import annotations
-
 import gc
 import weakref
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`limo-hog workshop grade`: a folder of nodes, some of them hostile."""
 
-from __future__ import annotations
-
 import csv
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Hostile nodes: each costs its own run alone, with a true sentence, and leaves nothing running."""
 
-from __future__ import annotations
-
 import json
 import re
 import sys

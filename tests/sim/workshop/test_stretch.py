@@ -1,7 +1,5 @@
 """The stretch tasks' checks: a node that does the task has all points, the workshop's solution does not."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The workshop's checker: it passes the model solutions, and fails mistakes for the right reason."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

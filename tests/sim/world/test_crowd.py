@@ -1,7 +1,5 @@
 """People push each other as the paper of 1995 says, find their way, react to the robot, and furniture moves."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """People keep their timetable, and walk as people do."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

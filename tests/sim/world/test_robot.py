@@ -1,7 +1,5 @@
 """The robot drives within its limits, and stops when it should."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

@@ -1,7 +1,5 @@
 """Scenarios are data, and data that cannot be run is refused by name; the people of a run are drawn from its seed."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from pathlib import Path

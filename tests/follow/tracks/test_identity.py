@@ -187,8 +187,7 @@ def test_others_are_learnt_only_beside_the_person_who_may_else_be_one_of_them() 
 
 def test_another_is_learnt_by_the_boxes_and_not_by_what_the_track_wore_before() -> None:
     hijacked = replace(person(2, 1.1, 1.5, IN_RED), worn=IN_GREEN)
-    (other,) = IDENTITY.update(followed(), at(1.1, person(1, 1.1), hijacked)).others
-    assert other.clothes == pytest.approx(IN_GREEN)
+    assert IDENTITY.update(followed(), at(1.1, person(1, 1.1), hijacked)).others[0].clothes == pytest.approx(IN_GREEN)
 
 
 def test_where_the_person_is_and_what_they_wear_is_learnt_where_it_is_sure() -> None:

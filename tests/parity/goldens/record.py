@@ -1,7 +1,6 @@
 """Ask OpenCV 4.14 every case anew and write `answers.json`: `uv run python -m tests.parity.goldens.record`.
 
-A new case goes into `varied.py`. The digests are those of an x86-64 CPU with AVX2 and FMA; on others OpenCV rounds a
-few gradients differently.
+The digests are those of an x86-64 CPU with AVX2 and FMA; on others OpenCV rounds a few gradients differently.
 """
 
 import hashlib

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from limo_hog.follow.decision import Controller, Decision, Mode
 from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import LIMO, RobotGeometry, Twist
-from limo_hog.follow.sense.arrivals import CAMERA, DEPTH, ODOMETRY, SCAN, Arrivals
 from limo_hog.follow.sense.clearance import (
     NO_POINTS,
     DepthGrid,
@@ -30,7 +29,17 @@ from limo_hog.follow.sense.clearance import (
     speed_within,
     to_odometry,
 )
-from limo_hog.follow.sense.observation import Observation, Odometry, Scan, Sensors
+from limo_hog.follow.sense.observation import (
+    CAMERA,
+    DEPTH,
+    ODOMETRY,
+    SCAN,
+    Arrivals,
+    Observation,
+    Odometry,
+    Scan,
+    Sensors,
+)
 from limo_hog.follow.tracks.asking import Whom, ask_of, checked
 
 S = TypeVar("S")

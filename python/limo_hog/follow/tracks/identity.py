@@ -86,27 +86,26 @@ class Identity:
         """Bring the probabilities up to a frame, whose boxes `tracks` holds."""
         people, seen = {one.number: one for one in tracks.people}, tracks.in_view
         walking = {one.number for one in tracks.people if self._walks_on(one, tracks)}
-        alone = {one.number for one in seen if self._is_alone(one, tracks)}
         chances = self._passed(known, people, tracks, walking)
-        odds, before = dict(chances), dict(known.chances)
-        own = known.traits.clothes
-        strangers = [replace(one, clothes=self._told_apart(one.clothes, own, tracks.variance)) for one in known.others]
+        absent, before, variance = max(1.0 - sum(chances.values()), 1e-6), dict(known.chances), tracks.variance
+        others = [self._told_apart(one, known.traits, variance) for one in known.others] if known.others else []
         for one in seen:
             number = one.number
             stays = before.get(number, 0.0) >= self.stays and number in walking
-            evidence = self._evidence(known.traits, strangers, one, tracks.variance, first=one.age <= 1)
-            odds[number] *= math.exp(self.steady * evidence if stays else evidence)
-        total = sum(odds.values()) + max(1.0 - sum(chances.values()), 1e-6)
-        chances = {number: value / total for number, value in odds.items()}
+            evidence = self._evidence(known.traits, others, one, variance, first=one.age <= 1)
+            chances[number] *= math.exp(self.steady * evidence if stays else evidence)
+        total, sure = sum(chances.values()) + absent, False
+        for number, odds in chances.items():
+            chances[number] = odds / total
         known = replace(known, chances=tuple(chances.items()))
-        sure = max([chances[one.number] for one in seen], default=0.0) >= self.sure
         for one in seen:
-            chance = chances[one.number]
-            if chance >= self.sure:
-                traits = self._moved(known.traits, one, tracks.variance) if one.number in alone else known.traits
+            if chances[one.number] >= self.sure:
+                sure = True
+                traits = self._moved(known.traits, one, variance) if self._is_alone(one, tracks) else known.traits
                 known = replace(known, place=one.track.place, at=one.measured, traits=traits)
-            elif sure and one.confirmed and chance <= 1.0 - self.sure:
-                known = self._other(known, one, tracks.variance)
+        for one in seen if sure else ():
+            if one.confirmed and chances[one.number] <= 1.0 - self.sure:
+                known = self._other(known, one, variance)
         return known
 
     def _passed(
@@ -183,8 +182,9 @@ class Identity:
         self, own: Traits, others: Sequence[Traits], person: Person, variance: float, *, first: bool
     ) -> float:
         """Return how much more likely a person's last box is on the person followed than on another [log-odds]."""
-        same = self._fit(person, own, variance, first=first)
-        strange = max(self._fit(person, traits, variance, first=first) for traits in (None, *others))
+        same, strange = self._fit(person, own, variance, first=first), self._fit(person, None, variance, first=first)
+        for traits in others:
+            strange = max(strange, self._fit(person, traits, variance, first=first))
         return min(max(same - strange, -self.most), self.most)
 
     def _fit(self, person: Person, traits: Traits | None, variance: float, *, first: bool) -> float:
@@ -212,15 +212,15 @@ class Identity:
         learnt = self._moved(others.pop(person.number, Traits(person.number, None, person.window)), person, variance)
         return replace(known, others=(*others.values(), learnt)[-self.remembered :])
 
-    def _told_apart(self, clothes: Clothes | None, own: Clothes | None, variance: float) -> Clothes | None:
-        """Return another's clothes, and the person's own in place of a shirt or trousers that do not clearly differ.
+    def _told_apart(self, other: Traits, own: Traits, variance: float) -> Traits:
+        """Return another's traits, with the person's own shirt or trousers where these do not clearly differ.
 
         What little they differ by is light, the same in every frame, and would soon add up to a proof.
         """
-        if clothes is None or own is None:
-            return clothes
-        same = ((clothes - own) ** 2).sum(axis=1) < self.clear * variance
-        return np.where(same[:, None], own, clothes)
+        if other.clothes is None or own.clothes is None:
+            return other
+        same = ((other.clothes - own.clothes) ** 2).sum(axis=1) < self.clear * variance
+        return replace(other, clothes=np.where(same[:, None], own.clothes, other.clothes))
 
     def _moved(self, traits: Traits, person: Person, variance: float) -> Traits:
         rate = max(self.rate, 1.0 / (traits.boxes + 1))

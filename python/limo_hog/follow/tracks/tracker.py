@@ -90,7 +90,8 @@ class Tracker:
         moving = [one for one in self.movers.moving(tracks.movers) if stamp - one.felt < self.movers.forget_s]
         others = self.movers.others(moving, known, measured, pose, self.noise)
         # A box that does not stand out from what is behind it is no confirmed person's.
-        others |= {(who, which) for who, person in enumerate(known) if person.confirmed for which in flat}
+        for which in flat:
+            others |= {(who, which) for who, person in enumerate(known) if person.confirmed}
         noise, variance = self.noise.turning(pose.angular), tracks.variance
         pairs = self.association.pair(known, measured, pose, noise, others, variance)
         people, boxes, recall = list[Person](), dict[int, int](), tracks.recall

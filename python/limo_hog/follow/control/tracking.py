@@ -250,7 +250,8 @@ class TrackingController:
         """Return the bearing [rad] of what moves in the scan, where a lost person can be by now; None without any."""
         now, known = situation.now, state.known
         tracks = self.tracker.may_be(state.choice.number, state.tracks, now)
-        if known is not None and now - known.stamp > self.tracker.legs_only_s:
+        others = state.choice.likeness.others if state.choice.likeness else ()
+        if others and known is not None and now - known.stamp > self.tracker.legs_only_s:
             # Among people something always moves; where the person may be is believed by then.
             return None
         if known is not None:

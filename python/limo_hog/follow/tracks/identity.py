@@ -182,9 +182,10 @@ class Identity:
         self, own: Traits, others: Sequence[Traits], person: Person, variance: float, *, first: bool
     ) -> float:
         """Return how much more likely a person's last box is on the person followed than on another [log-odds]."""
-        same, strange = self._fit(person, own, variance, first=first), self._fit(person, None, variance, first=first)
-        for traits in others:
-            strange = max(strange, self._fit(person, traits, variance, first=first))
+        same = self._fit(person, own, variance, first=first)
+        fits = [self._fit(person, traits, variance, first=first) for traits in (None, *others)]
+        # Of a track that begins, anybody who is about is as likely as the person; then whoever fits best is left.
+        strange = math.log(sum(map(math.exp, fits))) if first else max(fits)
         return min(max(same - strange, -self.most), self.most)
 
     def _fit(self, person: Person, traits: Traits | None, variance: float, *, first: bool) -> float:
@@ -226,7 +227,8 @@ class Identity:
         rate = max(self.rate, 1.0 / (traits.boxes + 1))
         clothes, window = traits.clothes, traits.window
         if person.worn is not None:
-            most = self.clear * variance
+            # The first boxes are averaged: one of them may be odd.
+            most = self.clear * variance if traits.boxes * self.rate >= 1.0 else math.inf
             clothes = person.worn if clothes is None else mixed(clothes, person.worn, rate, most)
         if person.tall is not None and abs(math.log(person.tall / window)) < self.stature_sigma:
             window += rate * (person.tall - window)

@@ -210,7 +210,9 @@ class Identity:
         """Learn what another person looks like, who is seen beside the one followed."""
         others = {traits.number: traits for traits in known.others}
         # By the boxes themselves: the track may have been another person's.
-        learnt = self._moved(others.pop(person.number, Traits(person.number, None, person.window)), person, variance)
+        before = others.pop(person.number, Traits(person.number, None, person.window))
+        # The first boxes are averaged: one of them may be odd.
+        learnt = self._moved(before, person, variance if before.boxes * self.rate >= 1.0 else math.inf)
         return replace(known, others=(*others.values(), learnt)[-self.remembered :])
 
     def _told_apart(self, other: Traits, own: Traits, variance: float) -> Traits:
@@ -227,8 +229,7 @@ class Identity:
         rate = max(self.rate, 1.0 / (traits.boxes + 1))
         clothes, window = traits.clothes, traits.window
         if person.worn is not None:
-            # The first boxes are averaged: one of them may be odd.
-            most = self.clear * variance if traits.boxes * self.rate >= 1.0 else math.inf
+            most = self.clear * variance
             clothes = person.worn if clothes is None else mixed(clothes, person.worn, rate, most)
         if person.tall is not None and abs(math.log(person.tall / window)) < self.stature_sigma:
             window += rate * (person.tall - window)

@@ -87,6 +87,12 @@ def test_a_person_who_may_be_the_lost_person_is_looked_at_for_four_seconds() -> 
         assert (after.unsure_at is None) == (chance < 0.1)
 
 
+def test_legs_alone_are_no_reason_to_stand_for_they_do_not_show_who_it_is() -> None:
+    for seen, candidates in ((NOW, (2,)), (NOW - 2.0, ())):
+        legs = replace(plain(2), seen=seen, felt=NOW)
+        assert choose(Choice(None, known(two=0.4), NOW - 1.0), legs).candidates == candidates
+
+
 def test_a_person_who_is_followed_in_doubt_is_followed_on_and_not_looked_at() -> None:
     after = choose(Choice(1, known(one=0.3), NOW), plain(1))
     assert (after.number, after.candidates, after.unsure_at) == (1, (), NOW)

@@ -95,12 +95,12 @@ class Selection:
             best, *rest = about
             since = now if choice.unsure_at is None else choice.unsure_at
             choice = replace(choice, unsure_at=since)
-            if now - since > self.decide_s:
-                likeness = replace(likeness, chances=((best.number, self.min_same),))
-                return Choice(best.number, likeness, choice.measured)
             if rest and sum(chances[one.number] for one in about) >= self.min_same:
+                if now - since > self.decide_s:
+                    likeness = replace(likeness, chances=((best.number, self.min_same),))
+                    return Choice(best.number, likeness, choice.measured)
                 return replace(choice, candidates=tuple(one.number for one in about))
-            if best.number != choice.number:
+            if best.number != choice.number and now - since <= self.decide_s:
                 # The person may have come back: they are looked at, not turned away from.
                 return replace(choice, candidates=(best.number,))
         choice = replace(choice, candidates=(), unsure_at=choice.unsure_at if about else None)

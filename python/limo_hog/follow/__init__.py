@@ -1,7 +1,5 @@
 """Follow a person: observations, controllers and the safety layer, without simulator or clock."""
 
-from __future__ import annotations
-
 from limo_hog.detections import Detector
 from limo_hog.follow.control.naming import CONTROLLERS, controller_named
 from limo_hog.follow.control.tracking import TrackingController
@@ -15,31 +13,8 @@ from limo_hog.follow.sense.measurement import Zone, person_depth, zone_of
 from limo_hog.follow.sense.observation import Frame, Observation, Odometry, Scan, Sensors
 
 __all__ = [
-    "CONTROLLERS",
-    "LIMO",
-    "ApproachController",
-    "Controller",
-    "Decision",
-    "Detector",
-    "Follower",
-    "Frame",
-    "FrameLog",
-    "Guard",
-    "Mode",
-    "Observation",
-    "Odometry",
-    "ProxemicController",
-    "Region",
-    "RobotError",
-    "RobotGeometry",
-    "Scan",
-    "Sensors",
-    "TrackingController",
-    "Twist",
-    "Zone",
-    "controller_named",
-    "detector_named",
-    "load_robot",
-    "person_depth",
-    "zone_of",
-]
+    "CONTROLLERS", "LIMO", "ApproachController", "Controller", "Decision", "Detector", "Follower", "Frame",
+    "FrameLog", "Guard", "Mode", "Observation", "Odometry", "ProxemicController", "Region", "RobotError",
+    "RobotGeometry", "Scan", "Sensors", "TrackingController", "Twist", "Zone", "controller_named",
+    "detector_named", "load_robot", "person_depth", "zone_of",
+]  # fmt: skip

@@ -90,10 +90,9 @@ class Identity:
         absent, before, variance = max(1.0 - sum(chances.values()), 1e-6), dict(known.chances), tracks.variance
         others = [self._told_apart(one, known.traits, variance) for one in known.others] if known.others else []
         for one in seen:
-            number = one.number
-            stays = before.get(number, 0.0) >= self.stays and number in walking
+            stays = before.get(one.number, 0.0) >= self.stays and one.number in walking
             evidence = self._evidence(known.traits, others, one, variance, first=one.age <= 1)
-            chances[number] *= math.exp(self.steady * evidence if stays else evidence)
+            chances[one.number] *= math.exp(self.steady * evidence if stays else evidence)
         total, sure = sum(chances.values()) + absent, False
         for number, odds in chances.items():
             chances[number] = odds / total

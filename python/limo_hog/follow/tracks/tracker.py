@@ -106,10 +106,10 @@ class Tracker:
                 recall = self.existence.learn(recall, height, found=who in pairs)
             if who in pairs:
                 boxes[person.number] = pairs[who]
-                clothes = person.clothes
                 person = self.correct(person, measured[pairs[who]], pose, chance, tracks.variance)
-                if person.confirmed and not person.strained and clothes is not None and person.worn is not None:
-                    variance = self.association.appearance.varied(variance, clothes, person.worn)
+                before = known[who].clothes
+                if person.confirmed and not person.strained and before is not None and person.worn is not None:
+                    variance = self.association.appearance.varied(variance, before, person.worn)
             elif expected and (not person.confirmed or stamp - person.measured < self.restart_s):
                 # Later than that it shows only that the person walked on, not that there is none. Legs that walk show
                 # that there is one.
@@ -123,8 +123,7 @@ class Tracker:
                 people.append(self.begin(number, seen, stamp, pose))
                 boxes[number] = which
                 number += 1
-        found = tuple(boxes.items())
-        tracks = replace(tracks, people=tuple(people), next_number=number, boxes=found)
+        tracks = replace(tracks, people=tuple(people), next_number=number, boxes=tuple(boxes.items()))
         return replace(tracks, recall=recall, variance=variance), boxes
 
     def begin(self, number: int, seen: Measurement, stamp: float, pose: Odometry) -> Person:

@@ -1,7 +1,6 @@
 """Random calls of the public Python API, each made of its number alone: an answer or a named error is wanted.
 
-`python -m tests.hardening.api --calls 10000000 --state FILE` makes the calls in processes of 100,000 each and writes
-what it found to FILE; started again, it goes on where it stopped. `--only N` makes call N alone, here.
+`python -m tests.hardening.api --calls 10000000 --state FILE` goes on where FILE ends; `--only N` makes call N alone.
 """
 
 import argparse

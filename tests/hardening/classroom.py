@@ -1,7 +1,4 @@
-"""A class of hundreds, a tenth of it hostile: every other mark is as when graded alone, and nothing is left running.
-
-`python -m tests.hardening.classroom --count 300` (half an hour on two cores).
-"""
+"""A class of hundreds, a tenth of it hostile, in half an hour: every other mark is as when graded alone."""
 
 import argparse
 import csv

@@ -1,7 +1,6 @@
 """Every command with closed descriptors, lost readers and an ASCII terminal; long commands killed at random times.
 
-`python -m tests.hardening.processes terminals kills --count 200`. The work is done and the exit code right whatever the
-terminal; nothing of a killed command runs on, no broken file has its name, and `--resume` completes.
+`python -m tests.hardening.processes terminals kills --count 200`. After a kill `--resume` completes the work.
 """
 
 import csv

@@ -1,7 +1,6 @@
 """Bad inputs by the thousand: `limo-hog` answers each by a line, and does the rest.
 
-`python -m tests.hardening.strangers names pictures films labels models scenarios recordings --count 1000`. Every
-command runs in a fork of a process that has imported what it needs: a thousand of a kind take a minute or two.
+`python -m tests.hardening.strangers names pictures films labels models scenarios recordings --count 1000` (minutes).
 """
 
 import importlib

@@ -305,7 +305,7 @@ def section(cards: dict[str, dict[str, dict[str, Any]]]) -> str:
     for scene, card in next(iter(cards.values())).items():
         by_kind.setdefault(card["kind"], []).append(scene)
     lines = [HEADING, "", PROSE, "", *table({f"`{name}`": list(of.values()) for name, of in cards.items()}), ""]
-    lines.extend(["", RELIABILITY, ""] if "tracking" in cards else [])
+    lines.extend([RELIABILITY, ""] if "tracking" in cards else [])
     if "tracking" in cards:
         parts = np.sum([card["believed"] for card in cards["tracking"].values()], axis=0)
         ends = [*PARTS[1:], 1.0]

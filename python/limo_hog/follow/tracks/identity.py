@@ -75,6 +75,7 @@ class Identity:
     speed: float = param(WALK, "m/s", "And further off by this for each second since.")
     clear: float = param(6.0, "chi² of 3", "A shirt or trousers that differ by more are not learnt.")
     rate: float = param(0.05, "1", "Share by which one box moves clothes and stature once they are learnt.")
+    settled: int = param(10, "1", "Boxes after which clothes that differ clearly are not learnt.")
     remembered: int = param(8, "1", "Other people that are remembered.")
 
     def begin(self, person: Person) -> Likeness:
@@ -209,9 +210,7 @@ class Identity:
         """Learn what another person looks like, who is seen beside the one followed."""
         others = {traits.number: traits for traits in known.others}
         # By the boxes themselves: the track may have been another person's.
-        before = others.pop(person.number, Traits(person.number, None, person.window))
-        # The first boxes are averaged: one of them may be odd.
-        learnt = self._moved(before, person, variance if before.boxes * self.rate >= 1.0 else math.inf)
+        learnt = self._moved(others.pop(person.number, Traits(person.number, None, person.window)), person, variance)
         return replace(known, others=(*others.values(), learnt)[-self.remembered :])
 
     def _told_apart(self, other: Traits, own: Traits, variance: float) -> Traits:
@@ -228,7 +227,8 @@ class Identity:
         rate = max(self.rate, 1.0 / (traits.boxes + 1))
         clothes, window = traits.clothes, traits.window
         if person.worn is not None:
-            most = self.clear * variance
+            # The first boxes are averaged: one of them may be odd.
+            most = self.clear * variance if traits.boxes >= self.settled else math.inf
             clothes = person.worn if clothes is None else mixed(clothes, person.worn, rate, most)
         if person.tall is not None and abs(math.log(person.tall / window)) < self.stature_sigma:
             window += rate * (person.tall - window)

@@ -227,8 +227,8 @@ class Identity:
         rate = max(self.rate, 1.0 / (traits.boxes + 1))
         clothes, window = traits.clothes, traits.window
         if person.worn is not None:
-            # The first boxes are averaged: one of them may be odd.
-            most = self.clear * variance if traits.boxes >= self.settled else math.inf
+            # The first boxes count by the variance of any light: one of them may be odd.
+            most = self.clear * (variance if traits.boxes >= self.settled else 1.0)
             clothes = person.worn if clothes is None else mixed(clothes, person.worn, rate, most)
         if person.tall is not None and abs(math.log(person.tall / window)) < self.stature_sigma:
             window += rate * (person.tall - window)

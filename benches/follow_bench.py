@@ -208,11 +208,11 @@ def believed(steps: Sequence[Step]) -> list[tuple[int, int]]:
     for step in steps:
         if step.seen is None:
             continue
-        for one in step.log.decision.belief.people:
-            part = bisect.bisect(PARTS, one.same or 0.0) - 1
-            if one.box is not None and part >= 0:
+        for person in step.log.decision.belief.people:
+            part = bisect.bisect(PARTS, person.same or 0.0) - 1
+            if person.box is not None and part >= 0:
                 told[part][0] += 1
-                told[part][1] += person_of(step.log.detections.windows[one.box], step.seen.people) == 0
+                told[part][1] += person_of(step.log.detections.windows[person.box], step.seen.people) == 0
     return [(count, right) for count, right in told]
 
 
@@ -305,8 +305,8 @@ def section(cards: dict[str, dict[str, dict[str, Any]]]) -> str:
     for scene, card in next(iter(cards.values())).items():
         by_kind.setdefault(card["kind"], []).append(scene)
     lines = [HEADING, "", PROSE, "", *table({f"`{name}`": list(of.values()) for name, of in cards.items()}), ""]
-    lines.extend([RELIABILITY, ""] if "tracking" in cards else [])
     if "tracking" in cards:
+        lines += [RELIABILITY, ""]
         parts = np.sum([card["believed"] for card in cards["tracking"].values()], axis=0)
         ends = [*PARTS[1:], 1.0]
         lines.append(f"| probability | {' | '.join(f'{a:g} … {b:g}' for a, b in zip(PARTS, ends, strict=True))} |")

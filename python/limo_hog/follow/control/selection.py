@@ -90,7 +90,7 @@ class Selection:
             if chance >= self.min_same and chance >= self.min_same_odds * next_best:
                 return Choice(best.number, likeness, best.measured if chance >= self.identity.sure else choice.measured)
             # Legs alone do not show who it is, however long they are looked at.
-            about = [one for one in about if now - one.seen <= self.identity.unseen_s]
+            about = [person for person in about if now - person.seen <= self.identity.unseen_s]
         if about:
             best, *rest = about
             since = now if choice.unsure_at is None else choice.unsure_at

@@ -89,7 +89,7 @@ class Identity:
         walking = {one.number for one in tracks.people if self._walks_on(one, tracks)}
         chances = self._passed(known, people, tracks, walking)
         absent, before, variance = max(1.0 - sum(chances.values()), 1e-6), dict(known.chances), tracks.variance
-        others = [self._told_apart(one, known.traits, variance) for one in known.others] if known.others else []
+        others = [self._told_apart(traits, known.traits, variance) for traits in known.others]
         for one in seen:
             stays = before.get(one.number, 0.0) >= self.stays and one.number in walking
             evidence = self._evidence(known.traits, others, one, variance, first=one.age <= 1)
@@ -103,9 +103,9 @@ class Identity:
                 sure = True
                 traits = self._moved(known.traits, one, variance) if self._is_alone(one, tracks) else known.traits
                 known = replace(known, place=one.track.place, at=one.measured, traits=traits)
-        for one in seen if sure else ():
-            if one.confirmed and chances[one.number] <= 1.0 - self.sure:
-                known = self._other(known, one, variance)
+        for person in seen:
+            if sure and person.confirmed and chances[person.number] <= 1.0 - self.sure:
+                known = self._other(known, person, variance)
         return known
 
     def _passed(

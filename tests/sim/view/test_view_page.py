@@ -207,14 +207,16 @@ def _see_it_end(page: Page) -> None:
     assert then[1].split()[0] == page.evaluate("number(nearest(history, 5)[DISTANCE], 2)")
     # A cursor on a plot reads the values, the wheel zooms.
     plot = page.locator("#plot-distance")
-    plot.scroll_into_view_if_needed()
     box = plot.bounding_box()
     assert box
     left = page.evaluate("LEFT")
-    page.mouse.move(box["x"] + left + (box["width"] - left - 4) / 2, box["y"] + box["height"] / 2)
-    page.screenshot(path=PICTURES / "timeline.png", full_page=True)
+    middle = {"x": left + (box["width"] - left - 4) / 2, "y": box["height"] / 2}
+    plot.hover(position=middle)
     begin, end = page.evaluate("shownTimes()")
     assert page.evaluate("cursor") == pytest.approx((begin + end) / 2, abs=0.1)
+    # A picture of the whole page resizes the view, and the mouse is on the plot no more.
+    page.screenshot(path=PICTURES / "timeline.png", full_page=True)
+    plot.hover(position=middle)
     page.mouse.wheel(0, -1)
     _until(page, f"shownTimes()[1] - shownTimes()[0] < {end - begin}")
     assert page.evaluate("shownTimes()[1] - shownTimes()[0]") == pytest.approx((end - begin) * 0.8)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page, Position, expect
 from tests.sim.view.browser import CHROMIUM, chromium, played
 
 from limo_hog.detector import PeopleDetector
@@ -207,10 +207,8 @@ def _see_it_end(page: Page) -> None:
     assert then[1].split()[0] == page.evaluate("number(nearest(history, 5)[DISTANCE], 2)")
     # A cursor on a plot reads the values, the wheel zooms.
     plot = page.locator("#plot-distance")
-    box = plot.bounding_box()
-    assert box
-    left = page.evaluate("LEFT")
-    middle = {"x": left + (box["width"] - left - 4) / 2, "y": box["height"] / 2}
+    left, width = page.evaluate("[LEFT, document.querySelector('#plot-distance').clientWidth]")
+    middle = Position(x=left + (width - left - 4) / 2, y=20)
     plot.hover(position=middle)
     begin, end = page.evaluate("shownTimes()")
     assert page.evaluate("cursor") == pytest.approx((begin + end) / 2, abs=0.1)

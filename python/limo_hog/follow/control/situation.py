@@ -75,8 +75,8 @@ class Situation:
 
 def carried(people: Array, pose: Odometry) -> Array:
     """Carry places and velocities (N, 4) from the odometry frame into the base frame of a robot at `pose`."""
-    velocities = from_odometry(people[:, 2:], replace(pose, x=0.0, y=0.0))
-    return np.concatenate([from_odometry(people[:, :2], pose), velocities], axis=1)
+    turned = from_odometry((people - (pose.x, pose.y, 0.0, 0.0)).reshape(-1, 2), replace(pose, x=0.0, y=0.0))
+    return turned.reshape(-1, 4)
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from operator import attrgetter
 
 import numpy as np
 
@@ -139,7 +140,7 @@ class TrackingController:
             # What lasts is no person: a wall's end seen from a new side seems to move.
             lasts = self.grid.is_near_blocked(state.ground, np.array([one[:2] for one in others]), lasting=True)
             others = tuple(one for one, stands in zip(others, lasts.tolist(), strict=True) if not stands)
-        people = np.array([track.mean for track in around]).reshape(-1, 4)
+        people = np.array([*map(attrgetter("mean"), around)]).reshape(-1, 4)
         pace = np.hypot(people[:, 2], people[:, 3])
         followed = None if own is None else around.index(own)
         walks = pace > self.slowest

@@ -95,15 +95,11 @@ class Grid:
         freed = np.where(cleared & (occupied <= 0), scan.stamp, ground.freed)
         return Ground(ground.corner, occupied, seen, freed, scan.stamp)
 
-    def cell_of(self, ground: Ground, points: Points) -> Cells:
-        """Return the cell of each point, int64 (N, 2); it may be outside of the square."""
-        return np.asarray(np.floor(points / self.cell).astype(np.int64) - ground.corner)
-
-    def flat(self, ground: Ground, points: Points) -> tuple[NDArray[np.int64], Mask]:
-        """Return the flat index of each point's cell, int64 (N,), 0 where it is not in the square, and if it is."""
-        cells = self.cell_of(ground, points)
+    def flat(self, ground: Ground, points: Points, side: int = 1) -> tuple[NDArray[np.int64], Mask]:
+        """Return the flat index of each point's cell, the first of `side` by `side`, and if all are inside; else 0."""
+        cells = np.floor(points / self.cell).astype(np.int64) - ground.corner
         # As unsigned numbers, what is below 0 is large.
-        within = cells.view(np.uint64) < self.cells
+        within = cells.view(np.uint64) <= self.cells - side
         inside = within[:, 0] & within[:, 1]
         return np.where(inside, cells[:, 0] * self.cells + cells[:, 1], 0), inside
 
@@ -123,16 +119,13 @@ class Grid:
 
     def is_near_blocked(self, ground: Ground, points: Points, *, lasting: bool = False) -> Mask:
         """Return whether an occupied cell is within half a cell of each point, bool (N,); at the edge none is."""
-        lowest = self.cell_of(ground, points - self.cell / 2)
-        within = lowest.view(np.uint64) < self.cells - 1
-        inside = within[:, 0] & within[:, 1]
-        flat = np.where(inside, lowest[:, 0] * self.cells + lowest[:, 1], 0)
+        flat, inside = self.flat(ground, points - self.cell / 2, side=2)
         steps = np.array((0, 1, self.cells, self.cells + 1), np.int64)
         return np.asarray(inside & self._is_occupied(ground, flat[:, None] + steps, lasting).any(axis=1))
 
     def lasting_near(self, ground: Ground, pose: Odometry, reach: float) -> Points:
         """Return the middles of cells within `reach` [m] in which something lasts, float64 (N, 2), odometry frame."""
-        x, y = self.cell_of(ground, np.array([[pose.x, pose.y]]))[0].tolist()
+        x, y = math.floor(pose.x / self.cell) - ground.corner[0], math.floor(pose.y / self.cell) - ground.corner[1]
         side = int(reach / self.cell)
         rows, columns = slice(max(x - side, 0), x + side + 1), slice(max(y - side, 0), y + side + 1)
         lasts = (ground.occupied[rows, columns] > 0) & (ground.freed[rows, columns] < ground.stamp - self.lasts_s)

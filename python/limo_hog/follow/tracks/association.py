@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
+from operator import attrgetter
 
 import numpy as np
 
@@ -162,5 +163,5 @@ def distances(points: Points, track: Track) -> Array:
 
 def all_distances(points: Points, tracks: Sequence[Track]) -> Array:
     """Return `distances` of M tracks at once, float64 (M, N) [m]."""
-    means = np.array([track.mean for track in tracks]).reshape(-1, 4, 1)
+    means = np.array([*map(attrgetter("mean"), tracks)]).reshape(-1, 4, 1)
     return np.asarray(np.hypot(points[:, 0] - means[:, 0], points[:, 1] - means[:, 1]))

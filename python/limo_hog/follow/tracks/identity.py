@@ -175,8 +175,10 @@ class Identity:
     def _is_alone(self, person: Person, tracks: Tracks) -> bool:
         """Whether nobody is so near that a person's box may show both or the other."""
         lately = (tracks.stamp or 0.0) - self.unseen_s
-        gaps = [separation(one, person) for one in tracks.people if one is not person and one.measured >= lately]
-        return min(gaps, default=math.inf) > self.meets
+        for one in tracks.people:
+            if one is not person and one.measured >= lately and separation(one, person) <= self.meets:
+                return False
+        return True
 
     def _evidence(
         self, own: Traits, others: Sequence[Traits], person: Person, variance: float, *, first: bool

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,8 +97,7 @@ class Movers:
             due = is_in_view(expected[index], returns, lidar, self.robot, self.robot.lidar_yaw)
             if returns.stamp - mover.felt < (self.forget_s if due else self.unseen_s):
                 kept.append(mover)
-        have_left = [mover.left for mover in kept]
-        if ground is not None and not all(have_left):
+        if ground is not None and not all(map(attrgetter("left"), kept)):
             began, since = np.array([one.began for one in kept]), np.array([one.since for one in kept])
             # The map is sure only a second after a person who stood there left; a beam that passes shows it at once.
             left = grid.is_free_since(ground, began, since) | self._passed(returns, began)
@@ -105,19 +105,18 @@ class Movers:
         places = self._groups(returns)
         if ground is not None and len(places):
             places = places[~grid.is_blocked(ground, places, lasting=True)]
-        new = all_distances(places, [one.track for one in kept]).min(axis=0, initial=np.inf) > self.legs.radius
+        new = all_distances(places, [*map(attrgetter("track"), kept)]).min(axis=0, initial=np.inf) > self.legs.radius
         begun = [self._begin(place, returns, noise) for place in places[new]]
         return (*kept, *begun)
 
-    def moving(self, movers: tuple[Mover, ...]) -> list[Mover]:
-        """Return those that have moved."""
-        return [
-            mover
-            for mover in movers
-            if mover.left
-            and mover.scans >= self.fewest_scans
-            and math.dist(mover.track.mean[:2], mover.began) > self.least_way
-        ]
+    def moving(self, movers: tuple[Mover, ...], since: float = -math.inf) -> list[Mover]:
+        """Return those that have moved, and were measured after `since` [s]."""
+        moved = []
+        for mover in movers:
+            way = math.dist(mover.track.mean[:2], mover.began)
+            if mover.left and mover.scans >= self.fewest_scans and mover.felt > since and way > self.least_way:
+                moved.append(mover)
+        return moved
 
     def felt(self, movers: tuple[Mover, ...], now: float) -> Points:
         """Return the places of what a scan has just shown, moving or not, float64 (N, 2) [m], odometry frame."""

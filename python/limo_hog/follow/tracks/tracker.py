@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import partial
+from operator import attrgetter
 
 from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import LIMO, RobotGeometry
@@ -81,13 +82,14 @@ class Tracker:
         """Bring all tracks up to a frame; also number -> index of the box of each person found."""
         tracks = self._remember(observation, tracks)
         stamp, pose = observation.stamp, pose_at(tracks.poses, observation.stamp)
-        known = [one for one in tracks.people if stamp - one.measured < self.forget_s]
-        if observation.between:
-            known = [self._walked(one, tracks.scans, stamp) for one in known]
-        known = [predict(one, stamp, self.noise) for one in known]
+        known = list[Person]()
+        for one in tracks.people:
+            if stamp - one.measured < self.forget_s:
+                one = self._walked(one, tracks.scans, stamp) if observation.between else one
+                known.append(predict(one, stamp, self.noise))
         measured = measure(observation, self.robot)
         flat = {which for which, seen in enumerate(measured) if not self.existence.is_solid(seen)}
-        moving = [one for one in self.movers.moving(tracks.movers) if stamp - one.felt < self.movers.forget_s]
+        moving = self.movers.moving(tracks.movers, stamp - self.movers.forget_s)
         others = self.movers.others(moving, known, measured, pose, self.noise)
         # A box that does not stand out from what is behind it is no confirmed person's.
         for which in flat:
@@ -269,7 +271,7 @@ class Tracker:
                 if one is not followed and now - one.measured <= lately_s:
                     others.append(Other(*track.place, now, one.clothes))
         own = None if followed is None else people.get(followed.number)
-        places, nameless = [track.place for track in people.values()], []
+        places, nameless = [*map(attrgetter("place"), people.values())], []
         for mover in self.movers.moving(tracks.movers):
             if mover.number in people:
                 continue

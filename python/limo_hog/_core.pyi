@@ -198,7 +198,7 @@ class Hog:
         scale: float = 1.05,
         similar: float | None = None,
         mean_shift: float | None = None,
-        first_level: _Pair | None = None,
+        searched_size: _Pair | None = None,
         guide: tuple[int, float, tuple[float, float]] | None = None,
         threads: int | None = None,
     ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
@@ -219,7 +219,7 @@ class Hog:
         mean_shift
             Group by the modes of the hits' density over place and scale (Dalal's thesis, 2006, chapter 5): the least
             density of a mode. With neither of the two every hit is returned.
-        first_level
+        searched_size
             Width and height [px]: the image is resized to this before all else, as `resize` does; boxes are in its
             pixels.
         guide

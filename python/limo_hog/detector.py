@@ -270,7 +270,7 @@ class PeopleDetector:
                 padding=self.padding,
                 scale=self._step,
                 similar=members,
-                first_level=size,
+                searched_size=size,
                 guide=_GUIDES[self.search],
                 threads=threads,
             )

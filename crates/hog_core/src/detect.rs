@@ -241,7 +241,7 @@ impl Hog {
         let spec = self.spec();
         let steps = self.steps(&options.search, spec.stride)?;
         let Some(svm) = &self.exact.svm else { return Ok(Vec::new()) };
-        let first = options.first_level.unwrap_or(image.size());
+        let first = options.searched_size.unwrap_or(image.size());
         check(first)?;
         let levels = levels(first, options.scale, spec, interrupt)?;
         let hits = self.hits(image, &levels, &steps, svm, options, interrupt)?;

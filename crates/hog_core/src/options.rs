@@ -44,7 +44,7 @@ pub struct SearchOptions {
     /// How much each level is smaller than the one before; 1 or less: one level alone.
     pub scale: f64,
     /// Size of the first level, to which the image is resized before all else; none: the image's own.
-    pub first_level: Option<Size>,
+    pub searched_size: Option<Size>,
     /// What becomes of the hits.
     pub grouping: Grouping,
     /// Where to look between the levels that are searched whole: faster, and some hits may be missed. None: everywhere.
@@ -58,7 +58,7 @@ impl Default for SearchOptions {
         Self {
             search: Search::default(),
             scale: 1.05,
-            first_level: None,
+            searched_size: None,
             grouping: Grouping::Similar(2),
             guide: None,
             threads: 1,
@@ -75,7 +75,7 @@ mod tests {
         let wanted = SearchOptions {
             search: Search { hit_threshold: 0.0, win_stride: (0, 0), padding: (0, 0) },
             scale: 1.05,
-            first_level: None,
+            searched_size: None,
             grouping: Grouping::Similar(2),
             guide: None,
             threads: 1,

@@ -102,7 +102,7 @@ fn candidates(detector: &Detector, image: ImageView, search: &Search, scale: f64
 const PYRAMID: SearchOptions = SearchOptions {
     search: PADDED,
     scale: 1.1,
-    first_level: None,
+    searched_size: None,
     grouping: Grouping::None,
     guide: None,
     threads: 1,
@@ -163,8 +163,8 @@ fn a_search_at_another_size_is_that_of_the_resized_image_on_every_backend() {
         // The grouping by mean-shift takes exact weights, which the exact path computes.
         for backend in available() {
             let hog = hog(&detector, backend);
-            let search = |image, first_level, grouping| {
-                let options = SearchOptions { first_level, grouping, ..PYRAMID };
+            let search = |image, searched_size, grouping| {
+                let options = SearchOptions { searched_size, grouping, ..PYRAMID };
                 hog.detect(image, &options, &Interrupt::NEVER).unwrap()
             };
             let found = search(picture.view(), Some(size), Grouping::None);
@@ -188,7 +188,7 @@ fn a_window_at_the_threshold_is_decided_on_the_resized_image() {
         for &Candidate { weight: hit_threshold, .. } in every.iter().filter(|one| one.scale > 1.0) {
             let wanted = every.iter().filter(|one| one.weight >= hit_threshold).count();
             let search = Search { hit_threshold, ..PADDED };
-            let options = SearchOptions { search, first_level: Some(size), scale: 1.2, ..PYRAMID };
+            let options = SearchOptions { search, searched_size: Some(size), scale: 1.2, ..PYRAMID };
             let found = hog.detect(picture.view(), &options, &Interrupt::NEVER).unwrap();
             assert_eq!(found.len(), wanted, "{} {hit_threshold}", backend.name());
         }

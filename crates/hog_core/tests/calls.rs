@@ -196,7 +196,7 @@ fn a_search_at_a_size_that_no_image_can_have_is_refused() {
     let hog = Hog::new(&detector.params, Some(&detector.coefficients)).unwrap();
     let at = |first: Size| {
         let options =
-            SearchOptions { search: STEPS, first_level: Some(first), scale: 1e9, ..Default::default() };
+            SearchOptions { search: STEPS, searched_size: Some(first), scale: 1e9, ..Default::default() };
         hog.detect(picture.view(), &options, &Interrupt::NEVER)
     };
     for (width, height) in [(1 << 29, 128), (64, 1 << 29), (1 << 40, 1 << 40), (0, 128), (64, 0)] {

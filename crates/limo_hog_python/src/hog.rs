@@ -156,7 +156,7 @@ impl Hog {
 
     #[allow(clippy::too_many_arguments, reason = "they are OpenCV's detectMultiScale arguments, and ours")]
     #[pyo3(signature = (image, *, hit_threshold = 0.0, win_stride = (0, 0), padding = (0, 0), scale = 1.05,
-        similar = None, mean_shift = None, first_level = None, guide = None, threads = None))]
+        similar = None, mean_shift = None, searched_size = None, guide = None, threads = None))]
     fn detect_multi_scale<'py>(
         &self,
         image: PyReadonlyArrayDyn<'py, u8>,
@@ -166,7 +166,7 @@ impl Hog {
         scale: f64,
         similar: Option<f64>,
         mean_shift: Option<f64>,
-        first_level: Option<Pair>,
+        searched_size: Option<Pair>,
         guide: Option<(u32, f64, (f64, f64))>,
         threads: Option<usize>,
     ) -> PyResult<(Array2<'py, i32>, Array1<'py, f64>)> {
@@ -182,7 +182,7 @@ impl Hog {
         let options = SearchOptions {
             search: Search { hit_threshold, win_stride, padding },
             scale,
-            first_level: first_level.map(size),
+            searched_size: searched_size.map(size),
             grouping,
             guide: guide.map(|(halvings, margin, reach)| Guide { halvings, margin, reach }),
             threads: at_work(threads.unwrap_or_else(calls::threads)),

@@ -208,6 +208,6 @@ def _search(detector: _core.Hog, image: NDArray[np.uint8], parameters: MiningPar
         hit_threshold=parameters.above,
         win_stride=(8, 8),
         scale=parameters.scale,
-        first_level=(enlarged * width, enlarged * height),
+        searched_size=(enlarged * width, enlarged * height),
     )
     return boxes.astype(np.float64), margins

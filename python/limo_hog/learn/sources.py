@@ -21,7 +21,7 @@ _FEW = 100
 
 
 @dataclass(frozen=True)
-class Source:
+class Provenance:
     """Files of one kind: the folder or file they came from, how many, and the hash of their names and bytes."""
 
     name: str
@@ -39,7 +39,7 @@ class TrainingData:
     #: Labelled pictures that are not learnt from; where there are none, the detector is not measured.
     validation: tuple[Picture, ...]
     min_height: float  #: height [px] from which objects are sought when the detector is measured
-    sources: tuple[Source, ...]  #: of each input, what it held
+    sources: tuple[Provenance, ...]  #: of each input, what it held
 
 
 @dataclass(frozen=True)
@@ -147,10 +147,10 @@ def _min_height(training: list[Picture], shape: WindowShape) -> float:
     return float(max(8, min(own, np.floor(np.percentile(sizes_of(training)[:, 1], 5)))))
 
 
-def _source(path: Path, crops: list[Path], labelled: list[Picture], free: list[Path]) -> Source:
+def _source(path: Path, crops: list[Path], labelled: list[Picture], free: list[Path]) -> Provenance:
     within = path if path.is_dir() else path.parent
     files = {file for file in (*crops, *free, *(picture.path for picture in labelled)) if file.is_relative_to(within)}
-    return Source(path.resolve().name, len(files), hash_of(files | ({path} if path.is_file() else set()), within))
+    return Provenance(path.resolve().name, len(files), hash_of(files | ({path} if path.is_file() else set()), within))
 
 
 def hash_of(files: Iterable[Path], folder: Path) -> str:

@@ -67,7 +67,8 @@ def _run(job: dict[str, Any], out: socket.socket, err: socket.socket, link: sock
             # The same boxes as OpenCV's in all but a few of a thousand images, many times faster. (Levels of a coarser
             # pyramid are too different to guide each other.)
             vars(cv2)["HOGDescriptor"] = limo_hog.HOGDescriptor
-            limo_hog.HOGDescriptor._guide = lambda _, scale: (3, 1.0, (2.0, 2.0)) if 1.0 < scale < 1.06 else None
+            guide = detector.Guide(halvings=3, margin=1.0, reach=(2.0, 2.0))
+            limo_hog.HOGDescriptor._guide = lambda _, scale: guide if 1.0 < scale < 1.06 else None
             detector._GUIDES["exact"] = detector._GUIDES["guided"]
             limo_hog.set_num_threads(1)
 

@@ -76,7 +76,7 @@ def test_legs_that_were_just_taken_for_the_persons_tell_nothing() -> None:
     assert known.of(1) < 0.5
 
 
-def test_a_track_kept_by_legs_beside_another_person_alone_may_not_be_the_person_any_more() -> None:
+def test_a_track_kept_by_legs_alone_beside_another_may_not_be_the_person_any_more() -> None:
     # The camera does not find the person, and legs of somebody else are .3 m beside those taken for theirs.
     for beside, low, high in ((0.3, 0.2, 0.6), (2.0, 0.9, 1.0)):
         known = followed()
@@ -109,7 +109,7 @@ def test_what_little_the_light_makes_of_the_clothes_of_two_alike_does_not_add_up
     assert known.of(2) < 0.2
 
 
-def test_a_track_that_begins_beside_the_person_or_too_far_off_to_be_walked_to_is_another() -> None:
+def test_a_track_that_begins_beside_the_person_or_too_far_off_to_walk_to_is_another() -> None:
     known = IDENTITY.update(followed(), at(1.1, person(1, 1.1), person(2, 1.1, 0.8, age=1)))
     assert (known.of(1) > 0.99, known.of(2)) == (True, 0.0)
     assert IDENTITY.update(followed(), at(2.0, person(2, 2.0, 4.0, age=1))).of(2) == 0.0

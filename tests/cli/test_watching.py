@@ -10,6 +10,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 import urllib.request
 from collections import Counter
@@ -22,7 +23,8 @@ import cv2
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
-from tests.cli.material import LIMO_HOG, frames_of, on_a_full_disk
+from tests.answers import AnswerTo
+from tests.cli.material import LIMO_HOG, PICTURE, frames_of, on_a_full_disk
 from tests.sim.view.stalled import stalled
 
 from limo_hog.cli.main import main
@@ -48,14 +50,12 @@ def test_the_film_is_h264_with_a_frame_for_each_of_the_cameras(kept: Path) -> No
     with av.open(kept / "run.mp4") as container:
         stream = container.streams.video[0]
         assert (stream.codec_context.name, stream.width, stream.height) == ("h264", 640, 480)
-        assert stream.average_rate == 10
-        assert len(list(container.decode(stream))) == frames == 10 * SECONDS
+        assert stream.average_rate == 10 and len(list(container.decode(stream))) == frames == 10 * SECONDS
 
 
 def test_the_figure_is_a_picture_with_something_on_it(kept: Path) -> None:
     picture = np.asarray(cv2.imread(str(kept / "run.png")))
-    assert picture.shape[1] > 1200
-    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 100
+    assert picture.shape[1] > 1200 and len(np.unique(picture.reshape(-1, 3), axis=0)) > 100
 
 
 def test_the_recording_is_read_by_another_library_than_wrote_it(kept: Path) -> None:
@@ -93,42 +93,37 @@ def test_a_recording_says_how_the_scenarios_lens_bends(tmp_path: Path) -> None:
     scenario.write_text("[camera]\nk1 = -0.1\nk2 = 0.02\n", encoding="utf-8")
     assert main(["follow", "--scenario", str(scenario), "--seconds", "1", "--record", str(path)]) == 0
     with AnyReader([path]) as reader:
-        infos = [one for one in reader.connections if one.topic == "/limo_camera/camera_info"]
-        messages: list[Any] = [reader.deserialize(data, one.msgtype) for one, _, data in reader.messages(infos)]
+        infos = [topic for topic in reader.connections if topic.topic == "/limo_camera/camera_info"]
+        messages: list[Any] = [reader.deserialize(data, topic.msgtype) for topic, _, data in reader.messages(infos)]
         told = {tuple(message.d) for message in messages}
     assert told == {(-0.1, 0.02, 0.0, 0.0, 0.0)}
 
 
-def test_follow_says_what_it_has_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_follow_says_what_it_has_written(tmp_path: Path, answer_to: AnswerTo) -> None:
     card, plot = tmp_path / "card.json", tmp_path / "run.png"
-    assert main(["follow", "--seconds", "1", "--json", str(card), "--plot", str(plot)]) == 0
-    assert f"written: {card}, {plot}\n" in capsys.readouterr().out
+    code, told, _ = answer_to("follow", "--seconds", 1, "--json", card, "--plot", plot)
+    assert code == 0 and f"written: {card}, {plot}\n" in told
 
 
-def test_a_replay_says_what_its_differences_are_of(kept: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["replay", str(kept / "run.mcap"), "--controller", "approach"]) == 0
-    told = capsys.readouterr().out
+def test_a_replay_says_what_its_differences_are_of(kept: Path, answer_to: AnswerTo) -> None:
+    code, told, _ = answer_to("replay", kept / "run.mcap", "--controller", "approach")
     assert re.search(rf"^same detections +\d+ of the {10 * SECONDS} frames recorded with some *$", told, re.MULTILINE)
     assert re.search(r"^largest difference of forward speed +[\d.]+ m/s *$", told, re.MULTILINE)
-    assert "differ where another detector, controller or version made the recording" in told
+    assert code == 0 and "differ where another detector, controller or version made the recording" in told
 
 
-def test_a_recording_replayed_gives_the_same_detections(
-    kept: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_recording_replayed_gives_the_same_detections(kept: Path, tmp_path: Path, answer_to: AnswerTo) -> None:
     film = tmp_path / "again.mp4"
-    assert main(["replay", str(kept / "run.mcap"), "--json", "-", "--video", str(film)]) == 0
-    card = json.loads(capsys.readouterr().out)
+    card = json.loads(answer_to("replay", kept / "run.mcap", "--json", "-", "--video", film).out)
     assert card["same_detections"] == card["frames_recorded_with_detections"] == card["frames"] == 10 * SECONDS
     assert card["frames_with_people"] > 10
-    assert card["linear_difference_max"] < 1e-6
-    assert card["angular_difference_max"] < 1e-6
+    assert card["linear_difference_max"] < 1e-6 and card["angular_difference_max"] < 1e-6
     assert frames_of(film) == 10 * SECONDS
 
 
-def test_a_recording_without_the_camera_says_what_it_holds(kept: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["replay", str(kept / "run.mcap"), "--ros-args", "-r", "limo_camera/image:=/other"]) == 1
-    assert "no images on /other; the recording holds /clock, /cmd_vel, " in capsys.readouterr().err
+def test_a_recording_without_the_camera_says_what_it_holds(kept: Path, answer_to: AnswerTo) -> None:
+    code, _, told = answer_to("replay", kept / "run.mcap", "--ros-args", "-r", "limo_camera/image:=/other")
+    assert code == 1 and "no images on /other; the recording holds /clock, /cmd_vel, " in told
 
 
 def at_a_display(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
@@ -164,13 +159,17 @@ def test_follow_opens_its_page_unasked_where_a_display_is_and_else_says_how(
     assert said == (not opens and "--json" not in options)
 
 
-def test_a_port_in_use_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("typed", ["follow --video a.mp4 --json a.json", "detect a.png --json j --csv c --out o"])
+def test_a_port_in_use_is_one_line_and_leaves_no_file_or_thread(typed: str, here: Path, answer_to: AnswerTo) -> None:
+    cv2.imwrite("a.png", PICTURE)
+    before = threading.enumerate()
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        assert main(["follow", "--seconds", "1", "--view", str(port)]) == 1
-    complaint = capsys.readouterr().err
-    assert complaint.count("\n") == 1
-    assert "give --view another port" in complaint
+        code, out, complaint = answer_to(*typed.split(), "--view", port)
+    assert (code, out, complaint.count("\n")) == (1, "", 1)
+    assert complaint.startswith(f"limo-hog: the page cannot be served at 127.0.0.1:{port}: ")
+    assert complaint.endswith("; give --view another port\n")
+    assert threading.enumerate() == before and [path.name for path in here.iterdir()] == ["a.png"]
 
 
 FULL = [("--video", "run.mp4", 0), ("--video", "run.mp4", 40_000), ("--record", "run.mcap", 0)]
@@ -180,8 +179,7 @@ FULL += [("--record", "run.mcap", 40_000), ("--plot", "run.png", 300), ("--json"
 @pytest.mark.parametrize(("option", "file", "room"), FULL)
 def test_a_full_disk_is_one_line_and_leaves_nothing(option: str, file: str, room: int, tmp_path: Path) -> None:
     done = on_a_full_disk(room, "follow", "--seconds", "3", option, str(tmp_path / file))
-    assert done.returncode == 1
-    assert done.stderr == f"limo-hog: {tmp_path / file}: {os.strerror(errno.EFBIG)}\n"
+    assert (done.returncode, done.stderr) == (1, f"limo-hog: {tmp_path / file}: {os.strerror(errno.EFBIG)}\n")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -205,13 +203,11 @@ def test_a_run_that_is_stopped_leaves_whole_files(name: str, tmp_path: Path) -> 
         time.sleep(0.05)
     process.send_signal(getattr(signal, name))
     said = process.communicate(timeout=60)[1]
-    assert process.returncode == 128 + getattr(signal, name)
-    assert said == "limo-hog: stopped\n"
+    assert (process.returncode, said) == (128 + getattr(signal, name), "limo-hog: stopped\n")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run.mcap", "run.mp4"]
     with AnyReader([bag]) as reader:
         images = sum(connection.msgcount for connection in reader.connections if connection.topic.endswith("/image"))
-    assert frames_of(film) > 0
-    assert abs(frames_of(film) - images) <= 1
+    assert frames_of(film) > 0 and abs(frames_of(film) - images) <= 1
 
 
 SLOW = [pytest.param(seed, marks=[pytest.mark.slow, pytest.mark.timeout(1800)]) for seed in range(1, 101)]

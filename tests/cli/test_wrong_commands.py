@@ -29,6 +29,7 @@ def test_help_breaks_no_address(command: str, answer_to: AnswerTo, monkeypatch: 
     assert "--plot" not in answer_to("arena", "--help").out  # which refuses it
 
 
+CONTROLLERS = "approach, proxemic, tracking, pursuit, ppo, policy:FILE.npz"
 #: Wrong arguments, which end with 2: what is typed, and a part of the last line of the answer.
 WRONG_ARGUMENTS = [
     ("", "usage: limo-hog"),
@@ -83,11 +84,11 @@ WRONG_ARGUMENTS = [
     ("score --suite v1 --scenario empty", "not allowed with"),
     ("score --suite v1 --seconds 60", "a run of this suite takes 40 s"),
     ("score --controller approach --against ppo", "--against ppo: is none of the controllers"),
-    ("score --controller zigzag", "is no controller; wanted is one of approach, proxemic, tracking, pursuit, ppo"),
-    ("score --scenario here/same.toml there/same.toml", "there/same.toml: is called 'same', as here/same.toml is"),
+    ("score --controller zigzag", f"'zigzag' is no controller; wanted is one of {CONTROLLERS}"),
+    ("score --scenario a/own.toml b/own.toml", "b/own.toml: is called 'own', as a/own.toml is; give it another name"),
     ("score --scenario named.toml empty", "empty: is called 'empty', as named.toml is; give it another name"),
     ("arena", "give --ros2, --view, --video or --record"),
-    ("arena --video a.mp4 --plot a.png --seconds 0.2", "a.png: an arena has no run to draw; use it with follow or run"),
+    ("arena --view 0 --seconds 1 --plot a.png", "--plot a.png: an arena has no run to draw; use it with follow or run"),
     ("run", "the following arguments are required: NODE.py"),
     ("workshop", "the following arguments are required: new|check|solution"),
     ("workshop check node.py --hint -1", "'-1' is no count; wanted is a whole number from 1 on"),
@@ -129,10 +130,10 @@ def folder(here: Path) -> None:
     """A working directory with two pictures, some texts and a folder."""
     cv2.imwrite("a.jpg", np.zeros((200, 200, 3), np.uint8))
     cv2.imwrite("tiny.png", np.zeros((60, 200, 3), np.uint8))
-    for place in ("folder", "here", "there"):
+    for place in ("folder", "a", "b"):
         Path(place).mkdir()
-    texts = {"there.txt": "text", "node.py": "", "named.toml": "name = 'empty'"}
-    for name, text in (texts | dict.fromkeys(("here/same.toml", "there/same.toml"), "")).items():
+    texts = {"there.txt": "text", "node.py": "", "named.toml": "name = 'empty'", "a/own.toml": "", "b/own.toml": ""}
+    for name, text in texts.items():
         Path(name).write_text(text)
 
 
@@ -157,7 +158,7 @@ def test_what_cannot_be_done_is_told_by_one_line_and_1(typed: str, told: str, an
 
 #: What needs OpenCV, and what Cyclone DDS.
 OPENCVS = "detect a.jpg|bench --image a.jpg|follow|arena --view|run node.py|workshop check node.py|score --seeds 1"
-NETWORKED = "follow --ros2|arena --ros2|topic list"
+DDS = ("follow --ros2", "arena --ros2", "topic list")
 #: Libraries that are not installed, what is typed then, and the end of the only line of the answer.
 MISSING = [
     *(("cv2", typed, "needs OpenCV: pip install 'limo-hog[cv]'") for typed in OPENCVS.split("|")),
@@ -165,11 +166,11 @@ MISSING = [
     ("av", "follow --video a.mp4", "writing H.264 video needs PyAV: pip install 'limo-hog[video]'"),
     ("matplotlib", "follow --plot a.png", "--plot needs matplotlib: pip install 'limo-hog[plot]'"),
     ("limo_sim", "follow", "limo-hog follow needs the arena: pip install 'limo-hog[sim]'"),
-    ("rosbags", "follow --record a.mcap", "pip install 'limo-hog[record]'"),
+    ("rosbags", "follow --record a.mcap", "limo-hog follow needs rosbags: pip install 'limo-hog[record]'"),
     ("rosbags", "run node.py", "limo-hog run needs rosbags: pip install 'limo-hog[record]'"),
     ("rosbags", "workshop check node.py", "limo-hog workshop needs rosbags: pip install 'limo-hog[record]'"),
-    ("rosbags", "replay a.mcap", "pip install 'limo-hog[record]'"),
-    *(("cyclonedds", typed, "needs Cyclone DDS: pip install 'limo-hog[ros2]'") for typed in NETWORKED.split("|")),
+    ("rosbags", "replay a.mcap", "limo-hog replay needs rosbags: pip install 'limo-hog[record]'"),
+    *(("cyclonedds", typed, "ROS 2 over the network needs Cyclone DDS: pip install 'limo-hog[ros2]'") for typed in DDS),
     ("shtab", "completion bash", "limo-hog completion needs shtab: pip install 'limo-hog[completion]'"),
     ("aiohttp", "follow --view", "the live page needs aiohttp: pip install 'limo-hog[view]'"),
 ]

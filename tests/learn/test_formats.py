@@ -88,11 +88,7 @@ def test_pictures_may_lie_elsewhere(folder: Path, tmp_path_factory: pytest.TempP
         ("x.json", '{"a.png": [[1, 2, 3, 1e300]]}', "of at most 1e"),
         ("x.json", '{"a.png": [], "a.png": []}', "'a.png' is there twice"),
         ("x.json", '{"images": [{"id": 1}, {"id": 1}], "annotations": []}', "two of its images have one id"),
-        (
-            "x.json",
-            '{"images": [], "annotations": [{"image_id": 1, "bbox": [1, 2, 3, 4], "iscrowd": "no"}]}',
-            "iscrowd or",
-        ),
+        ("x.json", '{"images": [], "annotations": [{"iscrowd": 2}]}', "iscrowd or ignore is [2, 0]; 0 or 1 is wanted"),
         ("x.xml", "<html/>", r"its outermost tag is <html>; wanted is VOC's"),
         ("x.xml", "<annotation", "wanted is VOC's"),
         ("x.xml", "<annotation><filename>a.png</filename><object/></annotation>", "has no <bndbox/xmin>"),
@@ -107,9 +103,9 @@ def test_other_files_are_refused_in_one_line(name: str, text: str, complaint: st
     path = folder / name
     path.parent.mkdir(exist_ok=True)
     path.write_text(text)
-    with pytest.raises(LabelError, match=complaint) as raised:
+    with pytest.raises(LabelError) as raised:
         read_labels(folder if name.startswith("labels") else path)
-    assert "\n" not in str(raised.value)
+    assert complaint in str(raised.value) and "\n" not in str(raised.value)
 
 
 @pytest.mark.parametrize("name", ["a.txt", "classes.txt"])

@@ -54,8 +54,8 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """As --record writes it."""
     path = tmp_path_factory.mktemp("recording") / "run.mcap"
     with bag_writer(path) as write:
-        for one in _told():
-            write(*one)
+        for told in _told():
+            write(*told)
     return path.read_bytes()
 
 
@@ -153,7 +153,7 @@ def _chunk(data: bytes, size: int, compression: bytes, crc: int = 0) -> bytes:
 BEGIN = b"\x89MCAP0\r\n" + _record(1, _string(b"ros2") + _string(b""))
 ZEROS = zstandard.compress(bytes(1 << 30))
 MESSAGE = _record(5, struct.pack("<HIQQ", 1, 0, 0, 0) + b"\0\1\0\0")
-MANY = MESSAGE * 600_000
+MANY = _chunk(zstandard.compress(MESSAGE * 600_000), len(MESSAGE) * 600_000, b"zstd")
 
 
 def _schema(text: bytes, encoding: bytes = b"ros2msg", name: bytes = b"a/msg/B", number: int = 1) -> bytes:
@@ -175,17 +175,17 @@ def _channel(encoding: bytes = b"cdr") -> bytes:
         (BEGIN + struct.pack("<BQ", 5, 1), "length that is wrong"),
         (BEGIN + _record(3, struct.pack("<HI", 1, (1 << 32) - 1)), "length that is wrong"),
         (BEGIN + bytes(1 << 25), "a record of no kind"),
-        (BEGIN + _chunk(ZEROS, 1 << 20, b"zstd"), "not 1048576 bytes long"),
-        (BEGIN + _chunk(ZEROS, 1 << 30, b"zstd"), f"{MAX_RECORD} are read at most"),
-        (BEGIN + _chunk(zstandard.compress(b"x") * 2, 2, b"zstd"), "not 2 bytes long"),
-        (BEGIN + _chunk(b"x" * 9, 9, b"zip"), "compressed by 'zip'"),
+        (BEGIN + _chunk(ZEROS, 1 << 20, b"zstd"), "a chunk that is not 1048576 bytes long, as it says"),
+        (BEGIN + _chunk(ZEROS, 1 << 30, b"zstd"), f"a chunk of {1 << 30} bytes; {MAX_RECORD} are read at most"),
+        (BEGIN + _chunk(zstandard.compress(b"x") * 2, 2, b"zstd"), "a chunk that is not 2 bytes long, as it says"),
+        (BEGIN + _chunk(b"x" * 9, 9, b"zip"), "a chunk compressed by 'zip'; known are zstd and lz4"),
         (BEGIN + _chunk(b"nonsense", 9, b"zstd"), "at byte"),
         (BEGIN + _chunk(b"nonsense", 9, b"lz4"), "at byte"),
         (BEGIN + _chunk(b"\x05" + bytes(8), 9, b"", crc=zlib.crc32(b"x")), "crc validation failed"),
         (BEGIN + _chunk(MESSAGE[:-5], len(MESSAGE) - 5, b""), "at byte"),
-        (BEGIN + MESSAGE, "channel 1, which is not declared"),
-        (BEGIN + _channel(), "type 1, which is not defined"),
-        (BEGIN + _schema(b"int32 x\n") + _channel(b"json"), "encoded as 'json'"),
+        (BEGIN + MESSAGE, "a message of channel 1, which is not declared"),
+        (BEGIN + _channel(), "/b is of the type 1, which is not defined"),
+        (BEGIN + _schema(b"int32 x\n") + _channel(b"json"), "/b is encoded as 'json', not 'cdr'"),
         (BEGIN + _schema(b"int32 x\n") + _channel() + MESSAGE, "at byte"),
         (BEGIN + _schema(b"x" * 200_000), "a definition of 200000 bytes"),
         (BEGIN + _schema(b"(" * 100_000), "at byte"),
@@ -193,8 +193,8 @@ def _channel(encoding: bytes = b"cdr") -> bytes:
         (BEGIN + _schema(b"a/B b\n") + _channel() + MESSAGE, "at byte"),
         (BEGIN + _schema(b"module a {" * 5_000, b"ros2idl"), "at byte"),
         (BEGIN + _schema(b"{}", b"jsonschema"), "known are ros2msg and ros2idl"),
-        (BEGIN + _chunk(zstandard.compress(MANY), len(MANY), b"zstd"), f"{MAX_RECORDS} records are read"),
-        (BEGIN + b"".join(_schema(b"int32 x\n", number=n) for n in range(1001)), "more definitions than the 1000"),
+        (BEGIN + MANY, f"a chunk of many records; {MAX_RECORDS} records are read at most"),
+        (BEGIN + b"".join(_schema(b"int32 x\n", number=n) for n in range(1001)), "more definitions than the 1000 that"),
         (BEGIN + _schema(b"\xff"), "at byte"),
         (BEGIN + _schema(b"string x\n", name=b"geometry_msgs/msg/Twist"), "Twist has other fields than that of ROS 2"),
     ],

@@ -143,7 +143,7 @@ def test_bad_data_is_refused_with_file_key_and_range(tmp_path: Path, text: str, 
 def test_a_missing_file_an_unknown_name_and_a_wrong_replacement_are_refused(tmp_path: Path) -> None:
     for name, told in (
         (tmp_path / "nowhere.toml", r"nowhere\.toml: cannot be read"),
-        ("wrokshop", "unknown scenario wrokshop: want one of .*workshop, "),
+        ("wrokshop", r"^unknown scenario wrokshop: want one of bollards, .*, workshop, or a \.toml file$"),
         ("wrokshop:3", "unknown scenario wrokshop:3"),
     ):
         with pytest.raises(ScenarioError, match=told):

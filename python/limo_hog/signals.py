@@ -46,15 +46,15 @@ def stopping() -> Iterator[None]:
         yield
         return
     _State.came = None
-    before = {one: signal.getsignal(one) for one in _SIGNALS}
-    for one, handler in before.items():
+    before = {number: signal.getsignal(number) for number in _SIGNALS}
+    for number, handler in before.items():
         if handler is not signal.SIG_IGN:
-            signal.signal(one, _stop)
+            signal.signal(number, _stop)
     try:
         yield
     finally:
-        for one, handler in before.items():
-            signal.signal(one, handler)
+        for number, handler in before.items():
+            signal.signal(number, handler)
         _State.came = None
 
 

@@ -140,10 +140,12 @@ class LimoFollowV1(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.render_mode = render_mode
         self._observe_kind = observe
         names = [scenario] if isinstance(scenario, Scenario | str) else list(scenario)
-        self._scenarios = [one if isinstance(one, Scenario) else Scenario.load(one) for one in names]
-        for one in self._scenarios:
+        self._scenarios = [
+            scenario if isinstance(scenario, Scenario) else Scenario.load(scenario) for scenario in names
+        ]
+        for scenario in self._scenarios:
             if observe != "state":
-                one.check_detector_is_plain("images are given, and there is no detector; observe the state")
+                scenario.check_detector_is_plain("images are given, and there is no detector; observe the state")
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
         self.observation_space = _space(observe)
         self._arena: Arena | None = None

@@ -108,16 +108,16 @@ def _print(title: str, evaluations: list[Evaluation]) -> None:
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
     for column in ("model", "LAMR", f"{CONFIDENCE:.0%}", "R at .1", "R at 1", "AP", "T at .1", "ms"):
         table.add_column(column, justify="left" if column == "model" else "right")
-    for one in evaluations:
-        low, high = one.intervals["lamr"]
-        figures = (f"{value:.3f}" for value in one.figures[1:])
+    for evaluation in evaluations:
+        low, high = evaluation.intervals["lamr"]
+        figures = (f"{value:.3f}" for value in evaluation.figures[1:])
         table.add_row(
-            Text(one.name),
-            f"{one.figures.lamr:.3f}",
+            Text(evaluation.name),
+            f"{evaluation.figures.lamr:.3f}",
             f"{low:.2f}..{high:.2f}",
             *figures,
-            f"{one.threshold_01:.2f}",
-            f"{one.ms:.1f}",
+            f"{evaluation.threshold_01:.2f}",
+            f"{evaluation.ms:.1f}",
         )
     screen = console()
     screen.print(table)

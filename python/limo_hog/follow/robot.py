@@ -49,15 +49,15 @@ class RobotGeometry:
     may_back: bool = True  #: Whether it may drive backwards.
 
     def __post_init__(self) -> None:
-        for one in fields(self):
-            value = getattr(self, one.name)
-            if "range" not in one.metadata:
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if "range" not in item.metadata:
                 if not isinstance(value, bool):
-                    raise RobotError(f"{one.name}: got {value!r}, want true or false")
+                    raise RobotError(f"{item.name}: got {value!r}, want true or false")
                 continue
-            low, high = one.metadata["range"]
+            low, high = item.metadata["range"]
             if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-                raise RobotError(f"{one.name}: got {value!r}, want a number in {low:g} … {high:g}")
+                raise RobotError(f"{item.name}: got {value!r}, want a number in {low:g} … {high:g}")
 
     def focal_px(self, width: int) -> float:
         """Return the camera's focal length for images of `width` [px]: 448.6 for 640."""
@@ -83,7 +83,7 @@ def load_robot(path: str | Path) -> RobotGeometry:
         raise RobotError(f"{path}: {error.strerror or error}") from error
     except (ValueError, RecursionError) as error:
         raise RobotError(f"{path}: cannot be read as TOML: {error}") from error
-    known = [one.name for one in fields(RobotGeometry)]
+    known = [item.name for item in fields(RobotGeometry)]
     for key in table:
         if key not in known:
             raise RobotError(f"{path}: {key}: unknown key, want one of {', '.join(known)}")

@@ -124,8 +124,8 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _box(label: str, numbers: Any, ignored: bool = False) -> Box:
-    are_numbers = isinstance(numbers, (list, tuple)) and all(type(one) in (int, float) for one in numbers)
-    if not are_numbers or len(numbers) != 4 or not all(abs(one) <= _FARTHEST_PX for one in numbers):
+    are_numbers = isinstance(numbers, (list, tuple)) and all(type(number) in (int, float) for number in numbers)
+    if not are_numbers or len(numbers) != 4 or not all(abs(number) <= _FARTHEST_PX for number in numbers):
         raise ValueError(f"a box is {shown(numbers)}; four finite numbers are wanted, of at most {_FARTHEST_PX:g} px")
     x, y, width, height = map(float, numbers)
     return Box(label, x, y, width, height, ignored)
@@ -133,7 +133,7 @@ def _box(label: str, numbers: Any, ignored: bool = False) -> Box:
 
 def _coco(data: dict[str, Any]) -> Iterator[_Named]:
     for kind in ("images", "categories"):
-        ids = [one["id"] for one in data.get(kind, [])]
+        ids = [item["id"] for item in data.get(kind, [])]
         if len(set(ids)) < len(ids):
             raise ValueError(f"two of its {kind} have one id")
     labels = {category["id"]: str(category["name"]) for category in data.get("categories", [])}

@@ -125,7 +125,7 @@ def _told(items: Iterable[Item], stage: str, steps: int, progress: Progress) -> 
 
 def _blocks(mined: Iterable[Mined]) -> list[NDArray[np.float32]]:
     """Return the descriptors as one block, or none."""
-    blocks = [one.descriptors for one in mined if len(one.descriptors)]
+    blocks = [batch.descriptors for batch in mined if len(batch.descriptors)]
     return [np.concatenate(blocks)] if blocks else []
 
 

@@ -62,11 +62,14 @@ def to_detections(message: Any) -> Detections:
 
     Raises `BagError` if a box has no score.
     """
-    if not all(one.results for one in message.detections):
+    if not all(detection.results for detection in message.detections):
         raise BagError(f"a {DETECTIONS_TYPE} has a box without a hypothesis: its score is missing")
-    middles = [(one.bbox.center.position, one.bbox.size_x, one.bbox.size_y) for one in message.detections]
+    middles = [
+        (detection.bbox.center.position, detection.bbox.size_x, detection.bbox.size_y)
+        for detection in message.detections
+    ]
     boxes = [(middle.x - width / 2, middle.y - height / 2, width, height) for middle, width, height in middles]
-    scores = [one.results[0].hypothesis.score for one in message.detections]
+    scores = [detection.results[0].hypothesis.score for detection in message.detections]
     people = np.rint(np.array(boxes).reshape(-1, 4)).astype(np.int32)
     return Detections(people, np.array(scores, np.float64), WHOLE_WINDOW)
 

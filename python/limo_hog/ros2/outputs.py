@@ -70,10 +70,10 @@ class Findings:
             return
         stamp, found, belief = log.frame.stamp, log.detections, log.decision.belief
         now = senses.newest(stamp)
-        ids = {one.box: one.number for one in belief.people if one.box is not None}
+        ids = {person.box: person.number for person in belief.people if person.box is not None}
         self._send(names.DETECTIONS, lambda: findings.detections_message(stamp, found, self._camera, ids))
         self._send(names.PEOPLE, lambda: findings.people_message(now, belief.people, self._base))
-        followed = next((one for one in belief.people if one.number == belief.followed), None)
+        followed = next((person for person in belief.people if person.number == belief.followed), None)
         if followed is not None:
             self._send(names.PERSON, lambda: findings.person_pose(now, followed, self._base))
         if belief.people and self._frames.has_readers:

@@ -117,7 +117,7 @@ def elsewhere(kinds: Mapping[str, str], node: NodeNames) -> list[str]:
     told = []
     for topic, *more in ((names.SCAN,), (names.ODOMETRY,), (names.DEPTH, names.DEPTH_LCAS)):
         wanted = "depth" if topic == names.DEPTH else names.TYPES[topic]
-        known = [names.resolved(node, one) for one in (topic, *more)]
+        known = [names.resolved(node, name) for name in (topic, *more)]
         others = sorted(other for other, kind in kinds.items() if kind == wanted)
         if others and not set(known) & set(others):
             rule = f"--ros-args -r {topic.lstrip('/')}:={others[0]}"

@@ -117,7 +117,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         tables: dict[str, Sequence[Summary | Comparison]]
         tables = {"summary": summaries, "groups": of_groups, "comparison": comparisons}
-        result = {name: [asdict(one) for one in rows] for name, rows in tables.items()}
+        result = {name: [asdict(row) for row in rows] for name, rows in tables.items()}
         write_json(args.json, {"runs": [card.to_json() for card in cards], **result})
     if args.csv:
         _write_csv(args.csv, cards)
@@ -174,10 +174,10 @@ def _write_csv(path: Path, cards: Sequence[ScoreCard]) -> None:
 def _show(summaries: Sequence[Summary], comparisons: Sequence[Comparison], runs: str) -> None:
     """Print both tables on standard output; `runs` says how many there were of each."""
     screen = console()
-    rows = [(one.scenario, one.controller, one.measures) for one in summaries]
+    rows = [(summary.scenario, summary.controller, summary.measures) for summary in summaries]
     screen.print(_table(rows, f"mean and, below, half the 95 % interval over {runs}"))
     if comparisons:
-        rows = [(one.scenario, one.controller, one.differences) for one in comparisons]
+        rows = [(comparison.scenario, comparison.controller, comparison.differences) for comparison in comparisons]
         words = f"minus {comparisons[0].against}, run by run; bold: the interval leaves out 0"
         screen.print(_table(rows, words, "+"))
 

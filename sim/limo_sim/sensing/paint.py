@@ -79,7 +79,11 @@ class Paint:
     def __init__(self, scenario: Scenario, sides: list[Side]) -> None:
         self._texture, self._sides = scenario.walls_texture, sides
         around = scenario.surroundings
-        passing = (one for one in scenario.people if one.walks_in or (one.yields and math.isfinite(one.leaves_s)))
+        passing = (
+            person
+            for person in scenario.people
+            if person.walks_in or (person.yields and math.isfinite(person.leaves_s))
+        )
         self._doors = [(door_of(person, around), person.height) for person in passing]
         plain = self._texture.kind == "plain" and not self._texture.posters
         doorless = (n for n, side in enumerate(sides) if not any(_on(side, place) for place, _ in self._doors))

@@ -110,10 +110,10 @@ def believed(step: Step) -> list[list[float | None]]:
     They are of being a person, and of being the person followed; None for that before one was followed.
     """
     people = step.log.decision.belief.people
-    places = _in_arena(np.array([(one.x, one.y) for one in people]).reshape(-1, 2), step).tolist()
+    places = _in_arena(np.array([(person.x, person.y) for person in people]).reshape(-1, 2), step).tolist()
     return [
-        [x, y, round(one.probability, 2), None if one.same is None else round(one.same, 2), one.number]
-        for one, (x, y) in zip(people, places, strict=True)
+        [x, y, round(person.probability, 2), None if person.same is None else round(person.same, 2), person.number]
+        for person, (x, y) in zip(people, places, strict=True)
     ]
 
 

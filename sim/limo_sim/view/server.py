@@ -53,7 +53,9 @@ class View(Live[Step]):
         if log.frame is not None:
             self._pictured = self._written, step
             boxes, tracked = log.detections.boxes, log.decision.belief.people
-            self._boxes |= {one.number: (log.time, boxes[one.box].tolist()) for one in tracked if one.box is not None}
+            self._boxes |= {
+                person.number: (log.time, boxes[person.box].tolist()) for person in tracked if person.box is not None
+            }
         people = [(None, None) if p is None else (p.x, p.y) for p in step.truth.people]
         self._rows.append([*reading.figures(step).values(), reading.measured_m(log), *robot, *itertools.chain(*people)])
         if log.decision.mode is Mode.SEARCH:
@@ -79,7 +81,7 @@ class View(Live[Step]):
             ],
             "zones": list(ZONE_ENDS.values()),
             "depth": {"far": self._scenario.depth.far_m, "colours": reading.depth_colours(self._scenario.depth.far_m)},
-            "parameters": [{**asdict(one), "whole": one.whole} for one in set_here],
+            "parameters": [{**asdict(parameter), "whole": parameter.whole} for parameter in set_here],
         }
 
     def _state(self, step: Step) -> dict[str, Any]:
@@ -107,7 +109,7 @@ class View(Live[Step]):
     def _choices(self, log: FrameLog) -> list[list[int]]:
         """Return who can be clicked on: number, whether followed, and the newest box x, y, w, h [px] of each."""
         belief = log.decision.belief
-        boxes = {one.number: self._boxes.get(one.number, (-math.inf, [])) for one in belief.people}
+        boxes = {person.number: self._boxes.get(person.number, (-math.inf, [])) for person in belief.people}
         fresh = ((number, box) for number, (at, box) in sorted(boxes.items()) if log.time - at < _BOX_S)
         return [[number, number == belief.followed, *box] for number, box in fresh]
 

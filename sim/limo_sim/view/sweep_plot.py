@@ -37,15 +37,15 @@ _PANELS = (
 
 def plot(summaries: Sequence[Summary], path: Path) -> None:
     """Draw summaries into a picture of the kind the path's suffix says."""
-    scenarios = list(dict.fromkeys(one.scenario for one in summaries))
-    controllers = list(dict.fromkeys(one.controller for one in summaries))
+    scenarios = list(dict.fromkeys(summary.scenario for summary in summaries))
+    controllers = list(dict.fromkeys(summary.controller for summary in summaries))
     size = 2.6 * len(_PANELS), 1.4 + (0.2 + 0.1 * len(controllers)) * len(scenarios)
     figure = Figure(figsize=size, layout="constrained", dpi=150)
     panels = figure.subplots(1, len(_PANELS), sharey=True, squeeze=False)[0]
     for axes, (name, title, share) in zip(panels, _PANELS, strict=True):
         for place, controller in enumerate(controllers):
             shift = 0.7 / len(controllers) * (place - (len(controllers) - 1) / 2)
-            _dots(axes, [one for one in summaries if one.controller == controller], name, scenarios, shift)
+            _dots(axes, [summary for summary in summaries if summary.controller == controller], name, scenarios, shift)
         axes.set_title(title.replace(" [", "\n["), loc="left", fontsize=10, color=_INK)
         axes.set_yticks(range(len(scenarios)), scenarios)
         axes.set_ylim(len(scenarios) - 0.5, -0.5)
@@ -53,7 +53,7 @@ def plot(summaries: Sequence[Summary], path: Path) -> None:
             axes.set_xlim(-0.02, 1.02)
         else:
             axes.set_xlim(left=-0.02 * axes.get_xlim()[1])
-        if all(one.measures[name] is None for one in summaries):
+        if all(summary.measures[name] is None for summary in summaries):
             axes.text(0.5, 0.5, "no data", transform=axes.transAxes, ha="center", color=_FAINT)
         axes.grid(axis="x", color=_FAINT, alpha=0.3, linewidth=0.6)
         axes.tick_params(length=0, labelsize=9, colors=_INK)
@@ -65,7 +65,7 @@ def plot(summaries: Sequence[Summary], path: Path) -> None:
 
 
 def _dots(axes: Axes, summaries: Sequence[Summary], name: str, scenarios: Sequence[str], shift: float) -> None:
-    found = [(one.scenario, one.measures[name]) for one in summaries]
+    found = [(summary.scenario, summary.measures[name]) for summary in summaries]
     dots = [(scenarios.index(where) + shift, estimate) for where, estimate in found if estimate is not None]
     colour, marker = _STYLES.get(summaries[0].controller, (_INK, "x"))
     means, rows = [estimate.mean for _, estimate in dots], [row for row, _ in dots]

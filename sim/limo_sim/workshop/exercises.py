@@ -153,7 +153,7 @@ def scene_named(name: str) -> Scene:
     Raises `ScenarioError` if there is no such scene.
     """
     of, _, scene = name.rpartition("/")
-    there = {one.name: one for one in exercise(of or "follower").scenes}
+    there = {scene.name: scene for scene in exercise(of or "follower").scenes}
     if scene not in there:
         raise ScenarioError(f"unknown scene {name!r}, want one of {', '.join(there)}, or EXERCISE/NAME")
     return there[scene]

@@ -59,7 +59,9 @@ def fingerprint(node: Path | str) -> str:
                 setattr(part, key, names.setdefault(old, str(len(names))))
         if isinstance(body := getattr(part, "body", None), list):
             # (Docstrings are comments.)
-            body[:] = [one for one in body if not isinstance(getattr(one, "value", None), ast.Constant)]
+            body[:] = [
+                statement for statement in body if not isinstance(getattr(statement, "value", None), ast.Constant)
+            ]
     return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
 
 

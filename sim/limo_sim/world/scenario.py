@@ -319,7 +319,9 @@ class Scenario:
             check_fields(group, f"{where}groups[{index}].")
             for member in group.members():
                 check_person(member, around, f"{where}groups[{index}], one of its people")
-        return dataclasses.replace(self, people=(*self.people, *(one for group in groups for one in group.members())))
+        return dataclasses.replace(
+            self, people=(*self.people, *(person for group in groups for person in group.members()))
+        )
 
     def check_detector_is_plain(self, why: str) -> None:
         """Raise `ScenarioError` if `[detector]` asks for faults where none can be added, which `why` explains."""
@@ -329,7 +331,7 @@ class Scenario:
 
     def _obstacles(self) -> list[tuple[str, Disc | Rectangle]]:
         """Return what stands in the room, by the name that a message gives it."""
-        pieces = ((f"furniture[{index}] ({one.kind})", one.footprint) for index, one in enumerate(self.furniture))
+        pieces = ((f"furniture[{index}] ({item.kind})", item.footprint) for index, item in enumerate(self.furniture))
         return [*pieces, *((f"walls[{index}]", wall.footprint) for index, wall in enumerate(self.walls))]
 
     def _check_inside(self, place: tuple[float, float], distance: float, names: tuple[str, str]) -> None:

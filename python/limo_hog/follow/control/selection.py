@@ -81,8 +81,8 @@ class Selection:
         likeness = self.identity.update(choice.likeness, tracks)
         choice = replace(choice, likeness=likeness)
         chances, measured = dict(likeness.chances), self.measured(tracks)
-        about = [one for one in measured if chances[one.number] >= self.other_below]
-        about.sort(key=lambda one: -chances[one.number])
+        about = [person for person in measured if chances[person.number] >= self.other_below]
+        about.sort(key=lambda person: -chances[person.number])
         if about:
             best, *rest = about
             chance = chances[best.number]
@@ -95,11 +95,11 @@ class Selection:
             best, *rest = about
             since = now if choice.unsure_at is None else choice.unsure_at
             choice = replace(choice, unsure_at=since)
-            if rest and sum(chances[one.number] for one in about) >= self.min_same:
+            if rest and sum(chances[person.number] for person in about) >= self.min_same:
                 if now - since > self.decide_s:
                     likeness = replace(likeness, chances=((best.number, self.min_same),))
                     return Choice(best.number, likeness, choice.measured)
-                return replace(choice, candidates=tuple(one.number for one in about))
+                return replace(choice, candidates=tuple(person.number for person in about))
             if best.number != choice.number and now - since <= self.decide_s:
                 # The person may have come back: they are looked at, not turned away from.
                 return replace(choice, candidates=(best.number,))
@@ -114,40 +114,40 @@ class Selection:
     def measured(self, tracks: Tracks) -> list[Person]:
         """Return the people who may be followed and were measured just now."""
         now, lately = tracks.stamp or 0.0, self.identity.unseen_s
-        return [one for one in tracks.people if now - one.measured <= lately and self.is_candidate(one)]
+        return [person for person in tracks.people if now - person.measured <= lately and self.is_candidate(person)]
 
     def _asked(self, whom: Whom, tracks: Tracks, choice: Choice) -> Choice | None:
         """Take the person asked for once they are in view; None where somebody else is followed until then."""
         now, follows = tracks.stamp or 0.0, choice.likeness is not None
         # Somebody who is followed is left for a confirmed person alone.
         people = [person for person in self.measured(tracks) if person.confirmed or not follows]
-        one = picked(whom, people, pose_at(tracks.poses, now))
-        if one is None:
+        person = picked(whom, people, pose_at(tracks.poses, now))
+        if person is None:
             return None if follows else replace(choice, number=None)
-        if follows and one.number == choice.number:
+        if follows and person.number == choice.number:
             return replace(choice, asked=None)
         since = now if choice.unsure_at is None else choice.unsure_at
         settled = follows or isinstance(whom, int) or now - since >= self.settles_s
-        if settled and one.confirmed and one.seen == now:
-            return Choice(one.number, self.identity.begin(one), one.measured)
-        return None if follows else replace(choice, number=one.number, unsure_at=since)
+        if settled and person.confirmed and person.seen == now:
+            return Choice(person.number, self.identity.begin(person), person.measured)
+        return None if follows else replace(choice, number=person.number, unsure_at=since)
 
     def _anybody(self, tracks: Tracks, choice: Choice) -> Choice:
         """Take the likeliest person in view, and of two the one straight ahead and near."""
         followed = tracks.person(choice.number)
         if followed is not None and followed.confirmed and followed.measured == tracks.stamp:
             return choice
-        candidates = [one for one in tracks.in_view if self.is_candidate(one)]
+        candidates = [person for person in tracks.in_view if self.is_candidate(person)]
         if followed is not None and followed not in candidates and self.is_candidate(followed):
             candidates.append(followed)
         if not candidates:
             return replace(choice, number=None)
         pose = pose_at(tracks.poses, tracks.stamp or 0.0)
 
-        def rank(one: Person) -> float:
-            off, distance = bearing_range(one.track, pose)
-            lead = self.switch_lead * (one is followed)
-            return one.existence - self.bearing_cost * abs(off) - self.distance_cost * distance + lead
+        def rank(person: Person) -> float:
+            off, distance = bearing_range(person.track, pose)
+            lead = self.switch_lead * (person is followed)
+            return person.existence - self.bearing_cost * abs(off) - self.distance_cost * distance + lead
 
         return replace(choice, number=max(candidates, key=rank).number)
 

@@ -116,7 +116,7 @@ class TrackingController:
             return replace(state, tracks=tracks)
         pose = pose_at(tracks.poses, scan.stamp)
         lately = observation.now - self.hiding.unseen_s
-        known = [one.track.place for one in tracks.people if one.confirmed and one.measured > lately]
+        known = [person.track.place for person in tracks.people if person.confirmed and person.measured > lately]
         people = np.array(known).reshape(-1, 2)
         depth_points = NO_POINTS
         if observation.depth is not None:
@@ -138,8 +138,8 @@ class TrackingController:
         others = self.hiding.remember(state.others, seen, felt, place, now)
         if others and state.ground is not None:
             # What lasts is no person: a wall's end seen from a new side seems to move.
-            lasts = self.grid.is_near_blocked(state.ground, np.array([one[:2] for one in others]), lasting=True)
-            others = tuple(one for one, stands in zip(others, lasts.tolist(), strict=True) if not stands)
+            lasts = self.grid.is_near_blocked(state.ground, np.array([other[:2] for other in others]), lasting=True)
+            others = tuple(other for other, stands in zip(others, lasts.tolist(), strict=True) if not stands)
         people = np.array([*map(attrgetter("mean"), around)]).reshape(-1, 4)
         pace = np.hypot(people[:, 2], people[:, 3])
         followed = None if own is None else around.index(own)
@@ -219,10 +219,10 @@ class TrackingController:
     def _unsure(self, situation: Situation, state: TrackingState) -> Aimed:
         """Stand and keep those in view of whom one is the person followed, until it shows which."""
         likeness, tracks = state.choice.likeness, state.tracks
-        people = [one for one in tracks.people if one.number in state.choice.candidates]
-        chances = [likeness.of(one.number) if likeness else 1.0 for one in people]
+        people = [person for person in tracks.people if person.number in state.choice.candidates]
+        chances = [likeness.of(person.number) if likeness else 1.0 for person in people]
         now, noise = situation.now, self.tracker.noise
-        offs = [bearing_range(predict(one.track, now, noise), situation.pose)[0] for one in people]
+        offs = [bearing_range(predict(person.track, now, noise), situation.pose)[0] for person in people]
         off = sum(chance * off for chance, off in zip(chances, offs, strict=True)) / max(sum(chances), 1e-6)
         which = f"which of {len(people)}" if len(people) > 1 else "whether this"
         return Aimed(Goal(off), Mode.HOLD, f"not sure {which} is the person followed", state)
@@ -242,7 +242,7 @@ class TrackingController:
             goal, reason = lookout.goal(hunt, situation, self.planner.sampling.times)
             places, way = lookout.ways(hunt, situation)
             belief, state = Belief(places=places, way=way), replace(state, hunt=hunt)
-        if any(self.selection.is_stranger(one, choice) for one in state.tracks.in_view):
+        if any(self.selection.is_stranger(person, choice) for person in state.tracks.in_view):
             reason += ": another is in view"
         goal = goal or Goal(0.0, rate=state.side * lookout.search_rate)
         return Aimed(goal, mode, reason, state), belief
@@ -257,8 +257,8 @@ class TrackingController:
             return None
         if known is not None:
             reach = self.tracker.association.same_place + self.lookout.wandering.walk * (now - known.stamp)
-            tracks = [one for one in tracks if math.dist(one.place, known.place) < reach]
-        return min((bearing_range(one, situation.pose)[0] for one in tracks), key=abs, default=None)
+            tracks = [track for track in tracks if math.dist(track.place, known.place) < reach]
+        return min((bearing_range(track, situation.pose)[0] for track in tracks), key=abs, default=None)
 
     def _is_sure(self, person: Person, state: TrackingState) -> bool:
         """Whether a track is the person followed, and not only the likeliest of those in view."""

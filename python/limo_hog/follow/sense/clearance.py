@@ -182,8 +182,9 @@ def room_seen_behind(looks: Sequence[Look], pose: Odometry, robot: RobotGeometry
 def _were_free(points: Points, looks: Sequence[Look], robot: RobotGeometry) -> Mask:
     """Return whether a beam of each look passed over each point, or the robot stood there, bool (L, N): all at once."""
     scans, poses = [look.scan for look in looks], [look.pose for look in looks]
-    limits = [(one.angle_min, one.angle_max, one.range_min, one.range_max, len(one.ranges)) for one in scans]
-    x, y, cos, sin = np.array([(one.x, one.y, math.cos(one.yaw), math.sin(one.yaw)) for one in poses]).T[:, :, None]
+    limits = [(scan.angle_min, scan.angle_max, scan.range_min, scan.range_max, len(scan.ranges)) for scan in scans]
+    turned = [(pose.x, pose.y, math.cos(pose.yaw), math.sin(pose.yaw)) for pose in poses]
+    x, y, cos, sin = np.array(turned).T[:, :, None]
     angle_min, angle_max, range_min, range_max, count = np.array(limits).T[:, :, None]
     dx, dy = points[:, 0] - x, points[:, 1] - y
     ahead, aside = cos * dx + sin * dy, cos * dy - sin * dx
@@ -197,7 +198,7 @@ def _were_free(points: Points, looks: Sequence[Look], robot: RobotGeometry) -> M
     # The scans one after the other, and where each begins.
     begins = np.cumsum(count, axis=0) - count
     at = (begins + np.minimum(np.maximum(beam, 0), count - 1)).astype(np.int64)
-    ranges = np.concatenate([one.ranges for one in scans])[at]
+    ranges = np.concatenate([scan.ranges for scan in scans])[at]
     # A beam that is no number, or shorter than the lidar can measure, shows nothing.
     passed = inside & (ranges >= range_min) & (np.minimum(ranges, range_max) > distance + BEAM_BEYOND)
     return np.asarray(covered | passed)

@@ -53,25 +53,25 @@ class Hiding:
         kept: list[Other] = []
         for person in seen:
             same = [
-                (now - one.at, apart, which)
-                for which, one in enumerate(left)
-                if (apart := math.dist(one[:2], person[:2])) <= self._reach(one, now)
-                and self.appearance.cost(one.clothes, person.clothes) <= self.appearance.other
+                (now - other.at, apart, which)
+                for which, other in enumerate(left)
+                if (apart := math.dist(other[:2], person[:2])) <= self._reach(other, now)
+                and self.appearance.cost(other.clothes, person.clothes) <= self.appearance.other
             ]
             if same:
                 # Somebody who was just measured, rather than one who was not for long and can be anywhere.
                 before = left.pop(min(same)[2])
                 person = person if person.clothes is not None else person._replace(clothes=before.clothes)
             kept.append(person)
-        for one in left:
-            gap, x, y = min(((math.dist((x, y), (one.x, one.y)), x, y) for x, y in legs), default=(math.inf, 0.0, 0.0))
-            kept.append(one._replace(x=x, y=y, at=now) if gap < self.same else one)
+        for lost in left:
+            gap, x, y = min(((math.dist((x, y), lost[:2]), x, y) for x, y in legs), default=(math.inf, 0.0, 0.0))
+            kept.append(lost._replace(x=x, y=y, at=now) if gap < self.same else lost)
         return tuple(kept)
 
     def circles(self, others: tuple[Other, ...], now: float) -> Points:
         """Return where people out of sight can be, float64 (H, 3): x, y and radius [m], odometry frame."""
-        hidden = [(one.x, one.y, self._reach(one, now)) for one in others if now - one.at > self.unseen_s]
+        hidden = [(other.x, other.y, self._reach(other, now)) for other in others if now - other.at > self.unseen_s]
         return np.array(hidden).reshape(-1, 3)
 
-    def _reach(self, one: Other, now: float) -> float:
-        return self.same + self.walk * (now - one.at)
+    def _reach(self, other: Other, now: float) -> float:
+        return self.same + self.walk * (now - other.at)

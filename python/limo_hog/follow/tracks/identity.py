@@ -85,24 +85,24 @@ class Identity:
 
     def update(self, known: Likeness, tracks: Tracks) -> Likeness:
         """Bring the probabilities up to a frame, whose boxes `tracks` holds."""
-        people, seen = {one.number: one for one in tracks.people}, tracks.in_view
-        walking = {one.number for one in tracks.people if self._walks_on(one, tracks)}
+        people, seen = {person.number: person for person in tracks.people}, tracks.in_view
+        walking = {person.number for person in tracks.people if self._walks_on(person, tracks)}
         chances = self._passed(known, people, tracks, walking)
         absent, before, variance = max(1.0 - sum(chances.values()), 1e-6), dict(known.chances), tracks.variance
         others = [self._told_apart(traits, known.traits, variance) for traits in known.others]
-        for one in seen:
-            stays = before.get(one.number, 0.0) >= self.stays and one.number in walking
-            evidence = self._evidence(known.traits, others, one, variance, first=one.age <= 1)
-            chances[one.number] *= math.exp(self.steady * evidence if stays else evidence)
+        for person in seen:
+            stays = before.get(person.number, 0.0) >= self.stays and person.number in walking
+            evidence = self._evidence(known.traits, others, person, variance, first=person.age <= 1)
+            chances[person.number] *= math.exp(self.steady * evidence if stays else evidence)
         total, sure = sum(chances.values()) + absent, False
         for number, odds in chances.items():
             chances[number] = odds / total
         known = replace(known, chances=tuple(chances.items()))
-        for one in seen:
-            if chances[one.number] >= self.sure:
+        for person in seen:
+            if chances[person.number] >= self.sure:
                 sure = True
-                traits = self._moved(known.traits, one, variance) if self._is_alone(one, tracks) else known.traits
-                known = replace(known, place=one.track.place, at=one.measured, traits=traits)
+                traits = self._moved(known.traits, person, variance) if self._is_alone(person, tracks) else known.traits
+                known = replace(known, place=person.track.place, at=person.measured, traits=traits)
         for person in seen:
             if sure and person.confirmed and chances[person.number] <= 1.0 - self.sure:
                 known = self._other(known, person, variance)
@@ -114,29 +114,29 @@ class Identity:
         """Return the tracks' probabilities before the frame's boxes; `walking` are those whose legs go on."""
         stamp = tracks.stamp or 0.0
         chances = {number: chance for number, chance in known.chances if number in people}
-        gone = {one.number for one in people.values() if self._is_gone(one, tracks, walking)}
+        gone = {person.number for person in people.values() if self._is_gone(person, tracks, walking)}
         for number in chances:
-            one = people[number]
+            person = people[number]
             if number in gone:
                 leaves = 1.0 - math.exp(-tracks.period / self.fades_s)
             elif number in walking:
                 leaves = 0.0
             else:
-                leaves = self.strained if one.strained and one.seen == stamp else self.passes
+                leaves = self.strained if person.strained and person.seen == stamp else self.passes
             chances[number] *= 1.0 - leaves
         lost_s = stamp - known.at
         share = min(max(lost_s - self.unseen_s, 0.0) / self.fades_s, 1.0) / 2
-        for number, one in people.items():
+        for number, person in people.items():
             if number in chances:
                 continue
-            near = math.dist(one.track.place, known.place) < self.reach + self.speed * lost_s
+            near = math.dist(person.track.place, known.place) < self.reach + self.speed * lost_s
             taken = share if near else 0.0
             absent = max(1.0 - sum(chances.values()), 0.0)
             leaving = gone & chances.keys()
             chances[number] = taken * (absent + sum(chances[other] for other in leaving))
             for other in leaving:
                 chances[other] *= 1.0 - taken
-        measured = [one for one in people.values() if stamp - one.measured <= self.unseen_s]
+        measured = [person for person in people.values() if stamp - person.measured <= self.unseen_s]
         absent = max(1.0 - sum(chances.values()), 0.0)
         own = known.traits.number
         if own in chances and people[own] in measured:
@@ -157,14 +157,14 @@ class Identity:
         lost, unseen = stamp - person.measured > self.unseen_s, stamp - person.seen > self.unseen_s
         if lost or not unseen or person.number in walking:
             return lost
-        beside = [one.track.place for one in tracks.movers if one.number != person.number]
+        beside = [mover.track.place for mover in tracks.movers if mover.number != person.number]
         here = person.track.place
         near = min([math.dist(here, place) for place in beside], default=math.inf) < self.meets
         return near or not self._is_alone(person, tracks)
 
     def _walks_on(self, person: Person, tracks: Tracks) -> bool:
         """Whether the scan shows that a track's legs are those they were, with nobody's beside them to change with."""
-        others = [one.track.place for one in tracks.movers if one.left and one.number != person.number]
+        others = [mover.track.place for mover in tracks.movers if mover.left and mover.number != person.number]
         for own in tracks.movers:
             if own.number == person.number and own.felt - own.named >= self.legs_s:
                 here = own.track.place
@@ -175,8 +175,8 @@ class Identity:
     def _is_alone(self, person: Person, tracks: Tracks) -> bool:
         """Whether nobody is so near that a person's box may show both or the other."""
         lately = (tracks.stamp or 0.0) - self.unseen_s
-        for one in tracks.people:
-            if one is not person and one.measured >= lately and separation(one, person) <= self.meets:
+        for other in tracks.people:
+            if other is not person and other.measured >= lately and separation(other, person) <= self.meets:
                 return False
         return True
 

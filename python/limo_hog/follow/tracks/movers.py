@@ -83,7 +83,7 @@ class Movers:
         kept: list[Mover] = []
         people = [mover for mover in movers if mover.number is not None]
         movers = (*people, *[mover for mover in movers if mover.number is None])
-        expected = [kalman.predict(one.track, returns.stamp, noise) for one in movers]
+        expected = [kalman.predict(mover.track, returns.stamp, noise) for mover in movers]
         gaps = all_distances(points, expected)
         whose, free, near = self._whose(movers, gaps), np.ones(len(points), bool), gaps < self.legs.radius
         for index, mover in enumerate(movers):
@@ -98,10 +98,10 @@ class Movers:
             if returns.stamp - mover.felt < (self.forget_s if due else self.unseen_s):
                 kept.append(mover)
         if ground is not None and not all(map(attrgetter("left"), kept)):
-            began, since = np.array([one.began for one in kept]), np.array([one.since for one in kept])
+            began, since = np.array([mover.began for mover in kept]), np.array([mover.since for mover in kept])
             # The map is sure only a second after a person who stood there left; a beam that passes shows it at once.
             left = grid.is_free_since(ground, began, since) | self._passed(returns, began)
-            kept = [replace(one, left=True) if gone else one for one, gone in zip(kept, left.tolist(), strict=True)]
+            kept = [replace(mover, left=True) if gone else mover for mover, gone in zip(kept, left, strict=True)]
         places = self._groups(returns)
         if ground is not None and len(places):
             places = places[~grid.is_blocked(ground, places, lasting=True)]
@@ -120,7 +120,7 @@ class Movers:
 
     def felt(self, movers: tuple[Mover, ...], now: float) -> Points:
         """Return the places of what a scan has just shown, moving or not, float64 (N, 2) [m], odometry frame."""
-        means = [one.track.mean for one in movers if now - one.felt < self.forget_s]
+        means = [mover.track.mean for mover in movers if now - mover.felt < self.forget_s]
         return np.array(means).reshape(-1, 4)[:, :2]
 
     def assign(self, movers: tuple[Mover, ...], seen: Sequence[Person], stamp: float) -> tuple[Mover, ...]:
@@ -155,13 +155,13 @@ class Movers:
         pairs: set[tuple[int, int]] = set()
         if len(moving) < 2 or not people:
             return pairs
-        places = [kalman.predict(one.track, people[0].track.stamp, noise).place for one in moving]
+        places = [kalman.predict(mover.track, people[0].track.stamp, noise).place for mover in moving]
         for which, seen in enumerate(boxes):
             if seen.range is None:
                 continue
             angle = pose.yaw + seen.bearing
             place = pose.x + seen.range * math.cos(angle), pose.y + seen.range * math.sin(angle)
-            gaps = [(math.dist(place, at), one.number) for at, one in zip(places, moving, strict=True)]
+            gaps = [(math.dist(place, at), mover.number) for at, mover in zip(places, moving, strict=True)]
             for who, person in enumerate(people):
                 own = min((gap for gap, number in gaps if number == person.number), default=0.0)
                 if min((gap for gap, number in gaps if number != person.number), default=math.inf) + self.nearer < own:
@@ -170,7 +170,7 @@ class Movers:
 
     def continued(self, person: Person, movers: tuple[Mover, ...], returns: Returns, noise: Noise) -> Person:
         """Return a person whom the camera does not show, brought up to a scan that shows their legs."""
-        legs = [one for one in movers if one.number == person.number and one.felt == returns.stamp]
+        legs = [mover for mover in movers if mover.number == person.number and mover.felt == returns.stamp]
         if not legs or returns.stamp <= person.felt:
             return person
         track, pose = kalman.predict(person.track, returns.stamp, noise), returns.pose
@@ -183,7 +183,7 @@ class Movers:
 
     def _whose(self, movers: tuple[Mover, ...], gaps: NDArray[np.float64]) -> NDArray[np.int64]:
         """Return whose legs each of N returns may be, the nearest, 0 for none; in `gaps`, (M, N), known people lead."""
-        numbers = np.array([one.number for one in movers if one.number is not None], np.int64)
+        numbers = np.array([mover.number for mover in movers if mover.number is not None], np.int64)
         if len(numbers) == 0:
             return np.zeros(gaps.shape[1], np.int64)
         gaps = gaps[: len(numbers)]

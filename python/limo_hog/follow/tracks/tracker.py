@@ -49,7 +49,7 @@ class Tracks:
     @property
     def in_view(self) -> list[Person]:
         """People found in the last frame."""
-        return [one for one in self.people if one.seen == self.stamp]
+        return [person for person in self.people if person.seen == self.stamp]
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,10 +83,10 @@ class Tracker:
         tracks = self._remember(observation, tracks)
         stamp, pose = observation.stamp, pose_at(tracks.poses, observation.stamp)
         known = list[Person]()
-        for one in tracks.people:
-            if stamp - one.measured < self.forget_s:
-                one = self._walked(one, tracks.scans, stamp) if observation.between else one
-                known.append(predict(one, stamp, self.noise))
+        for person in tracks.people:
+            if stamp - person.measured < self.forget_s:
+                person = self._walked(person, tracks.scans, stamp) if observation.between else person
+                known.append(predict(person, stamp, self.noise))
         measured = measure(observation, self.robot)
         flat = {which for which, seen in enumerate(measured) if not self.existence.is_solid(seen)}
         moving = self.movers.moving(tracks.movers, stamp - self.movers.forget_s)
@@ -115,7 +115,7 @@ class Tracker:
             elif expected and (not person.confirmed or stamp - person.measured < self.restart_s):
                 # Later than that it shows only that the person walked on, not that there is none. Legs that walk show
                 # that there is one.
-                walks = any(one.number == person.number for one in moving)
+                walks = any(mover.number == person.number for mover in moving)
                 evidence = 0.0 if walks else self.existence.of_miss(chance)
                 person = self.existence.update(person, evidence, found=False)
             people.append(person)
@@ -208,7 +208,7 @@ class Tracker:
                 if mover.number == person.number and mover.felt > now.measured:
                     now = replace(now, track=mover.track, felt=mover.felt)
         kept = now if unseen > 0 else replace(person, felt=now.felt)
-        people = [kept if one.number == person.number else one for one in tracks.people]
+        people = [kept if other.number == person.number else other for other in tracks.people]
         return now, replace(tracks, people=tuple(people))
 
     def _walked(self, person: Person, scans: tuple[Returns, ...], stamp: float) -> Person:
@@ -221,21 +221,21 @@ class Tracker:
 
     def follow_movers(self, tracks: Tracks, views: tuple[float, float], grid: Grid, ground: Ground | None) -> Tracks:
         """Enter the new scans into what moves; see `Movers.update`."""
-        movers, new = tracks.movers, [one for one in tracks.scans if one.stamp > tracks.moved_at]
+        movers, new = tracks.movers, [returns for returns in tracks.scans if returns.stamp > tracks.moved_at]
         if not new:
             return tracks
         people = tracks.people
-        seen = [one for one in people if one.confirmed and one.seen == tracks.stamp]
+        seen = [person for person in people if person.confirmed and person.seen == tracks.stamp]
         for returns in new:
             movers = self.movers.update(movers, returns, views, self.noise, grid, ground)
             movers = self.movers.assign(movers, seen, returns.stamp)
             movers = self._come_back(movers, people, returns.stamp)
-            unseen = [one for one in people if one.confirmed and one.seen != tracks.stamp]
+            unseen = [person for person in people if person.confirmed and person.seen != tracks.stamp]
             walking = {mover.number for mover in self.movers.moving(movers)} if unseen else set()
-            for one in unseen:
-                if (tracks.stamp or 0.0) - one.seen < self.legs_only_s or one.number in walking:
-                    now = self.movers.continued(one, movers, returns, self.noise)
-                    people = tuple(now if other is one else other for other in people)
+            for person in unseen:
+                if (tracks.stamp or 0.0) - person.seen < self.legs_only_s or person.number in walking:
+                    now = self.movers.continued(person, movers, returns, self.noise)
+                    people = tuple(now if other is person else other for other in people)
         return replace(tracks, people=people, movers=movers, moved_at=new[-1].stamp)
 
     def _come_back(self, movers: tuple[Mover, ...], people: tuple[Person, ...], stamp: float) -> tuple[Mover, ...]:
@@ -243,16 +243,17 @@ class Tracker:
 
         Only where they can be one person's alone, and that person has no others to choose from.
         """
-        lost = [one for one in people if one.confirmed and self.scan_period_s < stamp - one.measured < self.legs_only_s]
+        since, until = stamp - self.legs_only_s, stamp - self.scan_period_s
+        lost = [person for person in people if person.confirmed and since < person.measured < until]
         if not lost:
             return movers
-        walking = [one for one in self.movers.moving(movers) if one.number is None and one.felt == stamp]
-        pairs = [(one, mover) for one in lost for mover in walking if mover.since > one.measured]
-        pairs = [(one, mover) for one, mover in pairs if self._is_near(one, mover.track)]
+        walking = [mover for mover in self.movers.moving(movers) if mover.number is None and mover.felt == stamp]
+        pairs = [(person, mover) for person in lost for mover in walking if mover.since > person.measured]
+        pairs = [(person, mover) for person, mover in pairs if self._is_near(person, mover.track)]
         if len(pairs) != 1:
             return movers
-        one, legs = pairs[0]
-        return tuple(named(mover, one.number, stamp) if mover is legs else mover for mover in movers)
+        person, legs = pairs[0]
+        return tuple(named(mover, person.number, stamp) if mover is legs else mover for mover in movers)
 
     def around(
         self, tracks: Tracks, followed: Person | None, now: float, lately_s: float
@@ -264,12 +265,12 @@ class Tracker:
         """
         people: dict[int, Track] = {}
         others: list[Other] = []
-        for one in tracks.people:
-            one = followed if followed is not None and one.number == followed.number else one
-            if one.confirmed and now - one.measured <= self.walks_on_s:
-                people[one.number] = track = kalman.predict(one.track, now, self.noise)
-                if one is not followed and now - one.measured <= lately_s:
-                    others.append(Other(*track.place, now, one.clothes))
+        for person in tracks.people:
+            person = followed if followed is not None and person.number == followed.number else person
+            if person.confirmed and now - person.measured <= self.walks_on_s:
+                people[person.number] = track = kalman.predict(person.track, now, self.noise)
+                if person is not followed and now - person.measured <= lately_s:
+                    others.append(Other(*track.place, now, person.clothes))
         own = None if followed is None else people.get(followed.number)
         places, nameless = [*map(attrgetter("place"), people.values())], []
         for mover in self.movers.moving(tracks.movers):
@@ -292,8 +293,8 @@ class Tracker:
 
     def may_be(self, number: int | None, tracks: Tracks, now: float) -> list[Track]:
         """Return what moves in the scan and may be the person of a number, or one not shown yet, as of `now` [s]."""
-        moving = [one for one in self.movers.moving(tracks.movers) if one.number in (number, None)]
-        return [kalman.predict(one.track, now, self.noise) for one in moving if one.shown < self.movers.looks]
+        moving = [mover for mover in self.movers.moving(tracks.movers) if mover.number in (number, None)]
+        return [kalman.predict(mover.track, now, self.noise) for mover in moving if mover.shown < self.movers.looks]
 
     def _remember(self, observation: Observation, tracks: Tracks) -> Tracks:
         poses, scans = tracks.poses, tracks.scans
@@ -303,7 +304,7 @@ class Tracker:
             if scan is not None and (not scans or scan.stamp > scans[-1].stamp):
                 at = pose_at(poses, scan.stamp)
                 new = Returns(scan.stamp, to_odometry(scan_points(scan, self.robot), at), at)
-                scans = (*[one for one in scans if scan.stamp - one.stamp < self.scans_s], new)
+                scans = (*[returns for returns in scans if scan.stamp - returns.stamp < self.scans_s], new)
         period = tracks.period if tracks.stamp is None else observation.stamp - tracks.stamp
         period = min(max(period, self.min_period_s), self.max_period_s)
         return replace(tracks, poses=poses, scans=scans, stamp=observation.stamp, period=period)

@@ -56,10 +56,17 @@ def write_report(folder: Path, pictures: Sequence[Picture], evaluations: Sequenc
 def _plot(path: Path, evaluations: Sequence[Evaluation]) -> None:
     figure = Figure(figsize=(7, 5), dpi=120, layout="constrained")
     axes: Axes = figure.add_subplot()
-    for one in evaluations:
-        miss = np.maximum(1 - one.curve.recall, _LEAST_MISS_RATE / 2)
-        axes.step(np.maximum(one.curve.fppi, _FPPI[0]), miss, where="post", label=f"{one.figures.lamr:.3f}  {one.name}")
-    if all(one.curve.recall[one.curve.fppi <= _FPPI[0]].max(initial=0.0) == 1.0 for one in evaluations):
+    for evaluation in evaluations:
+        miss = np.maximum(1 - evaluation.curve.recall, _LEAST_MISS_RATE / 2)
+        axes.step(
+            np.maximum(evaluation.curve.fppi, _FPPI[0]),
+            miss,
+            where="post",
+            label=f"{evaluation.figures.lamr:.3f}  {evaluation.name}",
+        )
+    if all(
+        evaluation.curve.recall[evaluation.curve.fppi <= _FPPI[0]].max(initial=0.0) == 1.0 for evaluation in evaluations
+    ):
         axes.text(0.5, 0.5, "no misses", transform=axes.transAxes, ha="center", fontsize=16, color="#66727f")
     axes.set(xscale="log", yscale="log", xlim=_FPPI, ylim=(_LEAST_MISS_RATE, 1.02))
     axes.set(xlabel="false positives per image", ylabel="miss rate")
@@ -73,11 +80,11 @@ def _plot(path: Path, evaluations: Sequence[Evaluation]) -> None:
 
 
 def _page(pictures: int, objects: int, evaluations: Sequence[Evaluation], mistakes: bool) -> str:
-    rows = [_row(one) for one in evaluations]
+    rows = [_row(evaluation) for evaluation in evaluations]
     heights = [
-        (f"{one.name}, {_range(row.low, row.high)}", row.objects, f"{row.recall_01:.2f}", f"{row.recall_1:.2f}")
-        for one in evaluations
-        for row in one.by_height
+        (f"{evaluation.name}, {_range(row.low, row.high)}", row.objects, f"{row.recall_01:.2f}", f"{row.recall_1:.2f}")
+        for evaluation in evaluations
+        for row in evaluation.by_height
     ]
     differences = [
         (f"{evaluations[0].name} − {d.name}", _FIGURES[d.figure], f"{d.difference:+.3f}", _interval(d.interval, "+.3f"))
@@ -112,9 +119,11 @@ def _page(pictures: int, objects: int, evaluations: Sequence[Evaluation], mistak
     return "\n".join([*parts, "</html>", ""])
 
 
-def _row(one: Evaluation) -> tuple[str, ...]:
-    figures = [f"{getattr(one.figures, name):.3f} {_interval(one.intervals[name], '.2f')}" for name in _FIGURES]
-    return one.name, *figures, f"{one.threshold_01:.2f}", f"{one.ms:.1f}"
+def _row(evaluation: Evaluation) -> tuple[str, ...]:
+    figures = [
+        f"{getattr(evaluation.figures, name):.3f} {_interval(evaluation.intervals[name], '.2f')}" for name in _FIGURES
+    ]
+    return evaluation.name, *figures, f"{evaluation.threshold_01:.2f}", f"{evaluation.ms:.1f}"
 
 
 def _interval(ends: tuple[float, float], form: str) -> str:

@@ -166,7 +166,7 @@ def _by_height(outcomes: Outcomes, thresholds: tuple[float, float]) -> tuple[Hei
 
 def compare(first: Evaluation, other: Evaluation) -> list[Difference]:
     """Return how much the first detector's figures are above another's, with paired intervals."""
-    ours, theirs = (bootstrap(one.outcomes, DRAWS, seed=0) for one in (first, other))
+    ours, theirs = (bootstrap(evaluation.outcomes, DRAWS, seed=0) for evaluation in (first, other))
     return [
         Difference(other.name, figure, a - b, ends)
         for figure, a, b, ends in zip(
@@ -189,7 +189,7 @@ def as_json(used: Sequence[Picture], evaluations: Sequence[Evaluation]) -> dict[
         "objects": sum(not box.ignored for picture in used for box in picture.boxes),
         "min_iou": MIN_IOU,
         "confidence": CONFIDENCE,
-        "models": [_model_json(one) for one in evaluations],
+        "models": [_model_json(evaluation) for evaluation in evaluations],
         "differences": [
             {"model": d.name, "figure": d.figure, "difference": d.difference, "interval": list(d.interval)}
             for other in evaluations[1:]
@@ -198,16 +198,16 @@ def as_json(used: Sequence[Picture], evaluations: Sequence[Evaluation]) -> dict[
     }
 
 
-def _model_json(one: Evaluation) -> dict[str, Any]:
+def _model_json(evaluation: Evaluation) -> dict[str, Any]:
     return {
-        "model": one.name,
-        **one.figures._asdict(),
-        "intervals": {figure: list(ends) for figure, ends in one.intervals.items()},
-        "threshold_01": _finite(one.threshold_01),
-        "threshold_1": _finite(one.threshold_1),
-        "ms": round(one.ms, 3),
-        "by_height": [vars(row) | {"high": _finite(row.high)} for row in one.by_height],
-        "curve": {name: values.tolist() for name, values in one.curve._asdict().items()},
+        "model": evaluation.name,
+        **evaluation.figures._asdict(),
+        "intervals": {figure: list(ends) for figure, ends in evaluation.intervals.items()},
+        "threshold_01": _finite(evaluation.threshold_01),
+        "threshold_1": _finite(evaluation.threshold_1),
+        "ms": round(evaluation.ms, 3),
+        "by_height": [vars(row) | {"high": _finite(row.high)} for row in evaluation.by_height],
+        "curve": {name: values.tolist() for name, values in evaluation.curve._asdict().items()},
     }
 
 

@@ -17,6 +17,7 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 from limo_hog.exceptions import LimoHogError
@@ -128,8 +129,8 @@ class _Run:
         self._wait_until = time.monotonic() + _START_S
 
     def close(self) -> None:
-        """Close the connections."""
-        for end in self._ends:
+        """Close the connections, those of a node that could not be started as well."""
+        for end in chain(*self._pairs):
             end.close()
 
     def serve(self) -> Fault | None:

@@ -133,8 +133,7 @@ def test_a_place_is_worth_driving_to_that_shows_a_twentieth_of_the_places() -> N
     # All but a few are 20 m off, where no place in the map shows them.
     for few, worth in ((2, False), (4, True)):
         hunt = planned([(1.0, 1.0)] * few + [(20.0, 0.0)] * (50 - few))
-        assert (hunt.facing is not None) == worth
-        assert len(hunt.way) == 0
+        assert (hunt.facing is not None, len(hunt.way)) == (worth, 0)
 
 
 def test_from_further_than_three_and_a_half_metres_a_person_is_not_seen() -> None:

@@ -120,8 +120,7 @@ def test_a_track_that_is_no_person_after_all_is_left() -> None:
 def test_after_a_minute_anybody_is_followed_and_learnt_anew() -> None:
     for lost_s, number in ((59.9, 1), (60.1, 2)):
         after = choose(Choice(1, known(two=0.02), NOW - lost_s), plain(2))
-        assert after.number == number
-        assert (there(after.likeness).traits.number == 2) == (number == 2)
+        assert (after.number, there(after.likeness).traits.number == 2) == (number, number == 2)
         assert after.measured == (NOW if number == 2 else NOW - lost_s)
 
 

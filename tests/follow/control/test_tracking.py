@@ -280,8 +280,7 @@ def test_it_stays_with_the_person_it_began_with() -> None:
         decision = CONTROLLER.step(replace(view, detections=together(second, view.detections)), state)
         state = decision.state
         world.time += 0.1
-        assert state.choice.number == mine
-        assert decision.target == 1
+        assert (state.choice.number, decision.target) == (mine, 1)
 
 
 def seen_in(view: Observation, shirt: tuple[int, int, int]) -> Observation:

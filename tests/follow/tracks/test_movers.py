@@ -180,8 +180,7 @@ def test_nothing_moves_or_has_left_before_the_ground_is_mapped() -> None:
     for index in range(8):
         y = 0.1 * index
         movers = update(movers, SCAN_S * index, (2.0, y - 0.03), (2.0, y + 0.03), ground=None)
-    assert len(movers) == 1
-    assert MOVERS.moving(movers) == []
+    assert (len(movers), MOVERS.moving(movers)) == (1, [])
 
 
 def test_returns_are_one_movers_and_those_of_a_persons_legs_first() -> None:

@@ -77,8 +77,7 @@ def test_a_person_cut_off_by_the_image_can_only_be_taller_than_they_show() -> No
 def test_a_box_half_of_what_people_keep_from_each_other_off_may_be_anothers(side: int) -> None:
     for off, in_place in ((0.2, True), (0.3, False)):
         corrected = TRACKER.correct(a_person(1, 2.5), replace(box(2.5), range=2.5 + side * off), POSE)
-        assert corrected.strained == (not in_place)
-        assert corrected.tall == (WINDOW if in_place else None)
+        assert (corrected.strained, corrected.tall) == (not in_place, WINDOW if in_place else None)
 
 
 def test_the_stature_is_taken_from_whole_outlines_not_too_near() -> None:
@@ -131,8 +130,7 @@ def test_boxes_on_pictures_and_second_boxes_begin_no_track() -> None:
     twice = replace(view, detections=boxes((300, 100, 120, 240), (304, 100, 120, 240), (60, 100, 120, 240)))
     both, found = TRACKER.update(twice, Tracks())
     assert [one.number for one in both.people] == [1, 2]
-    assert found == {1: 0, 2: 2}
-    assert both.next_number == 3
+    assert (found, both.next_number) == ({1: 0, 2: 2}, 3)
 
 
 def test_a_new_track_is_a_person_the_likelier_the_surer_its_box() -> None:

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 from tests.sim.logs import WALL_CLOCK, kept_in
@@ -105,6 +106,13 @@ def test_a_watcher_that_fails_ends_the_node(run: Run) -> None:
 
     with pytest.raises(OSError, match="no space left"):
         run(node(DRIVE), STANDING, watch=full)
+
+
+def test_a_node_that_cannot_be_started_leaves_no_connection(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(worker.Worker, "begin", begin := Mock(side_effect=OSError))
+    with pytest.raises(OSError):
+        run(node(FOLLOW))
+    assert [end.fileno() for end in begin.call_args.args[1]] == [-1, -1, -1]
 
 
 def test_ctrl_c_ends_run_and_node_and_leaves_no_process(script: Callable[[str], Path]) -> None:

@@ -50,56 +50,78 @@ def replay(
     is worked on. Raises `BagError` if there are no images on the topic, or no camera info before the first;
     `MessageError` if an image or a depth image contradicts itself; `RobotError` as `Mounts.applied` has it.
     """
-    follower: Follower[Any] | None = None
-    senses, mounts, lidar = Senses(robot), Mounts(), ""
-    waiting: Any = None
-    recorded: Detections | None = None
-    topics: set[str] = set()
-    node = NodeNames("limo_hog_follower") if node is None else node
-    own = {
-        names.resolved(node, topic): topic
-        for topic in (*SENSED, names.IMAGE, names.IMAGE_COMPRESSED, names.COMMAND, names.TF_STATIC)
-    }
+    recording = _Recording(controller, detector, NodeNames("limo_hog_follower") if node is None else node, robot)
+    for record in records:
+        if (answered := recording.take(record)) is not None:
+            yield answered
+    if (last := recording.end()) is not None:
+        yield last
 
-    def work(now: float, twist: Twist | None) -> Replayed:
-        nonlocal follower
-        if follower is None:
-            base = frame_named(node, "base_frame")
-            follower = Follower(controller, detector, mounts.applied(robot, base, waiting.header.frame_id, lidar)[0])
-        if senses.focal_px is None:
-            raise BagError("no camera info before the first image: its focal length is needed")
-        frame = senses.frame(messages.to_seconds(waiting.header.stamp), picture_of(waiting))
-        # A new frame begins a control period, and so has a log.
-        return Replayed(frame, cast(FrameLog, follower.tick(now, frame, senses.sensors)), recorded, twist)
 
-    for topic, time, message in records:
-        topics.add(topic)
-        name = own.get(topic, "")
-        # Of a camera recorded both ways, the raw images are looked at.
-        is_image = name == names.IMAGE or (
-            name == names.IMAGE_COMPRESSED and names.resolved(node, names.IMAGE) not in topics
-        )
+class _Recording:
+    """What is known of a recording, and the image that waits for the command that answered it."""
+
+    def __init__(self, controller: Controller[Any], detector: Detector, node: NodeNames, robot: RobotGeometry) -> None:
+        self._controller, self._detector, self._node, self._robot = controller, detector, node, robot
+        self._follower: Follower[Any] | None = None
+        self._senses, self._mounts, self._lidar = Senses(robot), Mounts(), ""
+        self._waiting: Any = None
+        self._recorded: Detections | None = None
+        self._topics: set[str] = set()
+        self._time = 0.0  # of the last record
+        known = (*SENSED, names.IMAGE, names.IMAGE_COMPRESSED, names.COMMAND, names.TF_STATIC)
+        self._own = {names.resolved(node, topic): topic for topic in known}
+
+    def take(self, record: Record) -> Replayed | None:
+        """Take in a record; return what is made of the frame that waited, where this one ends the wait."""
+        topic, self._time, message = record
+        self._topics.add(topic)
+        name, answered = self._own.get(topic, ""), None
+        is_image = self._is_image(name)
         drives = name == names.COMMAND and message.__msgtype__ in _COMMANDS
         command = messages.to_twist(message) if drives else None
-        if waiting is not None and (is_image or command is not None):
-            yield work(time, command)
-            waiting = recorded = None
-        elif command is not None and follower is not None:
-            follower.tick(time, None, senses.sensors)
+        if self._waiting is not None and (is_image or command is not None):
+            answered = self._work(command)
+        elif command is not None and self._follower is not None:
+            self._follower.tick(self._time, None, self._senses.sensors)
         if is_image:
-            waiting = message
+            self._waiting = message
         elif message.__msgtype__ == names.DETECTIONS_TYPE:
-            recorded = to_detections(message)
+            self._recorded = to_detections(message)
         elif name == names.TF_STATIC:
-            mounts.take(message)
+            self._mounts.take(message)
         elif name in SENSED:
-            lidar = message.header.frame_id if name == names.SCAN else lidar
-            senses.take(message)
-    if waiting is not None:
-        yield work(time, None)
-    if follower is None:
-        there = ", ".join(sorted(topics)) or "nothing"
-        raise BagError(f"no images on {names.resolved(node, names.IMAGE)}; the recording holds {there}")
+            self._lidar = message.header.frame_id if name == names.SCAN else self._lidar
+            self._senses.take(message)
+        return answered
+
+    def end(self) -> Replayed | None:
+        """Return what is made of a frame that no command answered."""
+        if self._waiting is not None:
+            return self._work(None)
+        if self._follower is None:
+            there = ", ".join(sorted(self._topics)) or "nothing"
+            raise BagError(f"no images on {names.resolved(self._node, names.IMAGE)}; the recording holds {there}")
+        return None
+
+    def _is_image(self, name: str) -> bool:
+        """Whether a topic's images are looked at: of a camera recorded both ways, the raw ones."""
+        raw = names.resolved(self._node, names.IMAGE)
+        return name == names.IMAGE or (name == names.IMAGE_COMPRESSED and raw not in self._topics)
+
+    def _work(self, twist: Twist | None) -> Replayed:
+        """Let the follower look at the frame that waits, which `twist` answered then."""
+        image, recorded, self._waiting, self._recorded = self._waiting, self._recorded, None, None
+        if self._follower is None:
+            base = frame_named(self._node, "base_frame")
+            robot = self._mounts.applied(self._robot, base, image.header.frame_id, self._lidar)[0]
+            self._follower = Follower(self._controller, self._detector, robot)
+        if self._senses.focal_px is None:
+            raise BagError("no camera info before the first image: its focal length is needed")
+        frame = self._senses.frame(messages.to_seconds(image.header.stamp), picture_of(image))
+        # A new frame begins a control period, and so has a log.
+        log = cast(FrameLog, self._follower.tick(self._time, frame, self._senses.sensors))
+        return Replayed(frame, log, recorded, twist)
 
 
 def kind_of(record: Record) -> str:

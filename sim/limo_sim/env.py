@@ -140,9 +140,7 @@ class LimoFollowV1(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.render_mode = render_mode
         self._observe_kind = observe
         names = [scenario] if isinstance(scenario, Scenario | str) else list(scenario)
-        self._scenarios = [
-            scenario if isinstance(scenario, Scenario) else Scenario.load(scenario) for scenario in names
-        ]
+        self._scenarios = [name if isinstance(name, Scenario) else Scenario.load(name) for name in names]
         for scenario in self._scenarios:
             if observe != "state":
                 scenario.check_detector_is_plain("images are given, and there is no detector; observe the state")

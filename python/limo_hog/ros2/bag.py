@@ -64,10 +64,8 @@ def to_detections(message: Any) -> Detections:
     """
     if not all(detection.results for detection in message.detections):
         raise BagError(f"a {DETECTIONS_TYPE} has a box without a hypothesis: its score is missing")
-    middles = [
-        (detection.bbox.center.position, detection.bbox.size_x, detection.bbox.size_y)
-        for detection in message.detections
-    ]
+    found = [detection.bbox for detection in message.detections]
+    middles = [(box.center.position, box.size_x, box.size_y) for box in found]
     boxes = [(middle.x - width / 2, middle.y - height / 2, width, height) for middle, width, height in middles]
     scores = [detection.results[0].hypothesis.score for detection in message.detections]
     people = np.rint(np.array(boxes).reshape(-1, 4)).astype(np.int32)

@@ -58,15 +58,10 @@ def _plot(path: Path, evaluations: Sequence[Evaluation]) -> None:
     axes: Axes = figure.add_subplot()
     for evaluation in evaluations:
         miss = np.maximum(1 - evaluation.curve.recall, _LEAST_MISS_RATE / 2)
-        axes.step(
-            np.maximum(evaluation.curve.fppi, _FPPI[0]),
-            miss,
-            where="post",
-            label=f"{evaluation.figures.lamr:.3f}  {evaluation.name}",
-        )
-    if all(
-        evaluation.curve.recall[evaluation.curve.fppi <= _FPPI[0]].max(initial=0.0) == 1.0 for evaluation in evaluations
-    ):
+        label = f"{evaluation.figures.lamr:.3f}  {evaluation.name}"
+        axes.step(np.maximum(evaluation.curve.fppi, _FPPI[0]), miss, where="post", label=label)
+    curves = [evaluation.curve for evaluation in evaluations]
+    if all(curve.recall[curve.fppi <= _FPPI[0]].max(initial=0.0) == 1.0 for curve in curves):
         axes.text(0.5, 0.5, "no misses", transform=axes.transAxes, ha="center", fontsize=16, color="#66727f")
     axes.set(xscale="log", yscale="log", xlim=_FPPI, ylim=(_LEAST_MISS_RATE, 1.02))
     axes.set(xlabel="false positives per image", ylabel="miss rate")

@@ -99,6 +99,15 @@ def test_a_lost_person_is_known_again_by_the_clothes_and_another_is_not() -> Non
         assert low <= known.of(2) <= high
 
 
+def test_a_track_of_another_that_goes_over_to_the_lost_person_is_known_by_the_clothes() -> None:
+    for clothes, low, high in ((IN_RED, 0.8, 1.0), (IN_GREEN, 0.0, 0.1)):
+        known = IDENTITY.update(followed(), at(1.1, person(1, 1.1), person(2, 1.1, 0.8, IN_GREEN, age=1)))
+        for frame in range(12, 32):
+            found = person(2, 0.1 * frame, 0.8, clothes)
+            known = IDENTITY.update(known, at(0.1 * frame, person(1, 0.1 * frame, measured=1.1), found))
+        assert low <= known.of(2) <= high
+
+
 def test_what_little_the_light_makes_of_the_clothes_of_two_alike_does_not_add_up() -> None:
     dim = IN_RED - [[0.0, 0.0, 0.0], [0.0, 0.0, 0.9]]
     known = IDENTITY.update(followed(), at(1.1, person(1, 1.1), person(2, 1.1, 1.0, dim)))

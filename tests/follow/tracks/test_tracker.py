@@ -237,15 +237,6 @@ def test_legs_follow_no_person_who_is_unknown_or_missed_too_often_for_chance() -
         assert (with_legs(replace(unseen(1, 0.9), misses=misses), 1.0, (2.0, 0.1)).felt == 1.0) == felt
 
 
-def test_legs_that_walk_are_where_a_person_not_found_in_this_frame_is() -> None:
-    mover = replace(walker(1, 2.0, 0.4), felt=1.0)
-    for seen, taken in ((0.8, True), (1.0, False)):
-        now, _ = TRACKER.follow_legs(
-            unseen(1, seen), Tracks((unseen(1, seen),), stamp=1.0, movers=(mover,)), GRID, None
-        )
-        assert (now.track is mover.track) == taken
-
-
 def leg_track(x: float) -> Track:
     return Track(1.0, (x, 0.0, 0.0, 0.0), upper(np.diag([0.04, 0.04, 0.5, 0.5])))
 

@@ -129,8 +129,7 @@ class Identity:
         for number, person in people.items():
             if number in chances:
                 continue
-            near = math.dist(person.track.place, known.place) < self.reach + self.speed * lost_s
-            taken = share if near else 0.0
+            taken = share if self._reaches(known, person, lost_s) else 0.0
             absent = max(1.0 - sum(chances.values()), 0.0)
             leaving = gone & chances.keys()
             chances[number] = taken * (absent + sum(chances[other] for other in leaving))
@@ -138,10 +137,10 @@ class Identity:
                 chances[other] *= 1.0 - taken
         measured = [person for person in people.values() if stamp - person.measured <= self.unseen_s]
         absent = max(1.0 - sum(chances.values()), 0.0)
-        own = known.traits.number
-        if own in chances and people[own] in measured:
-            # What was taken for another person's box may have been none.
-            chances[own] += self.passes * absent
+        for person in measured:
+            # A track may have gone over to the person: their box was taken for another's.
+            if person.number == known.traits.number or self._reaches(known, person, lost_s):
+                chances[person.number] += self.passes * absent
         for left, right in itertools.combinations(measured, 2):
             if separation(left, right) < self.meets and not {left.number, right.number} <= walking:
                 passing = math.dist(left.track.mean[2:], right.track.mean[2:]) * tracks.period
@@ -150,6 +149,10 @@ class Identity:
                 chances[left.number] += swapped
                 chances[right.number] -= swapped
         return chances
+
+    def _reaches(self, known: Likeness, person: Person, lost_s: float) -> bool:
+        """Whether the person followed, lost for `lost_s` [s], can have walked to where a track is."""
+        return math.dist(person.track.place, known.place) < self.reach + self.speed * lost_s
 
     def _is_gone(self, person: Person, tracks: Tracks, walking: AbstractSet[int]) -> bool:
         """Whether a track is not measured, or only by legs that may be those of somebody beside it."""

@@ -202,11 +202,6 @@ class Tracker:
             if (unseen == 0 or returns.stamp > person.felt) and returns.stamp > now.track.stamp - self.scan_period_s:
                 track = self.legs.update(now.track, returns, self.noise, is_ground)
                 now = now if track is None else replace(now, track=track, felt=returns.stamp)
-        if unseen > 0:
-            for mover in self.movers.moving(tracks.movers):
-                # What stands could be a chair; what moved on from where the person was is the person.
-                if mover.number == person.number and mover.felt > now.measured:
-                    now = replace(now, track=mover.track, felt=mover.felt)
         kept = now if unseen > 0 else replace(person, felt=now.felt)
         people = [kept if other.number == person.number else other for other in tracks.people]
         return now, replace(tracks, people=tuple(people))

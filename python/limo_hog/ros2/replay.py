@@ -106,8 +106,9 @@ class _Recording:
 
     def _is_image(self, name: str) -> bool:
         """Whether a topic's images are looked at: of a camera recorded both ways, the raw ones."""
-        raw = names.resolved(self._node, names.IMAGE)
-        return name == names.IMAGE or (name == names.IMAGE_COMPRESSED and raw not in self._topics)
+        if name != names.IMAGE_COMPRESSED:
+            return name == names.IMAGE
+        return names.resolved(self._node, names.IMAGE) not in self._topics
 
     def _work(self, twist: Twist | None) -> Replayed:
         """Let the follower look at the frame that waits, which `twist` answered then."""

@@ -138,7 +138,7 @@ class Identity:
         measured = [person for person in people.values() if stamp - person.measured <= self.unseen_s]
         absent = max(1.0 - sum(chances.values()), 0.0)
         for person in measured:
-            # A track may have gone over to the person: their box was taken for another's.
+            # A track may have gone over to the person; their own may have been doubted for a box that was nobody's.
             if person.number == known.traits.number or self._reaches(known, person, lost_s):
                 chances[person.number] += self.passes * absent
         for left, right in itertools.combinations(measured, 2):

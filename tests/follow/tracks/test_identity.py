@@ -38,6 +38,14 @@ def test_one_box_of_odd_colours_does_not_lose_the_person() -> None:
     assert known.of(1) > 0.9
 
 
+def test_a_first_box_that_shows_the_shirt_in_place_of_the_trousers_is_soon_outvoted() -> None:
+    known = IDENTITY.begin(person(1, 0.0, clothes=IN_RED[[0, 0]]))
+    for frame in range(1, 11):
+        known = IDENTITY.update(known, at(0.1 * frame, person(1, 0.1 * frame)))
+        assert known.of(1) > 0.9
+    assert known.traits.clothes == pytest.approx(IN_RED)
+
+
 def test_a_person_whose_legs_have_been_the_same_stays_the_person() -> None:
     for with_legs, low, high in ((True, 0.9, 1.0), (False, 0.0, 0.1)):
         known = followed()

@@ -30,6 +30,7 @@ class Traits:
     clothes: Clothes | None  #: What is worn; None where no colour image tells.
     window: float  #: Height of the detection window, times the distance [px m]: the stature.
     boxes: int = 1  #: Boxes it was learnt from [1].
+    first: tuple[Clothes, ...] = ()  #: What the first of them showed, of which any may be odd.
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +76,7 @@ class Identity:
     speed: float = param(WALK, "m/s", "And further off by this for each second since.")
     clear: float = param(6.0, "chi² of 3", "A shirt or trousers that differ by more are not learnt.")
     rate: float = param(0.05, "1", "Share by which one box moves clothes and stature once they are learnt.")
-    settled: int = param(10, "1", "Boxes after which clothes that differ clearly are not learnt.")
+    settled: int = param(10, "1", "Boxes by which it is learnt what a person wears; then what differs clearly is not.")
     remembered: int = param(8, "1", "Other people that are remembered.")
 
     def begin(self, person: Person) -> Likeness:
@@ -91,6 +92,8 @@ class Identity:
         absent, before, variance = max(1.0 - sum(chances.values()), 1e-6), dict(known.chances), tracks.variance
         others = [self._told_apart(traits, known.traits, variance) for traits in known.others]
         for person in seen:
+            if self._settles(known.traits, person, tracks):
+                continue
             stays = before.get(person.number, 0.0) >= self.stays and person.number in walking
             evidence = self._evidence(known.traits, others, person, variance, first=person.age <= 1)
             chances[person.number] *= math.exp(self.steady * evidence if stays else evidence)
@@ -175,6 +178,11 @@ class Identity:
                     return True
         return False
 
+    def _settles(self, traits: Traits, person: Person, tracks: Tracks) -> bool:
+        """Whether a box is one of the first of a track that goes on: it shows what the person followed looks like."""
+        begins = person.number == traits.number and traits.boxes < self.settled
+        return begins and not person.strained and self._is_alone(person, tracks)
+
     def _is_alone(self, person: Person, tracks: Tracks) -> bool:
         """Whether nobody is so near that a person's box may show both or the other."""
         lately = (tracks.stamp or 0.0) - self.unseen_s
@@ -230,11 +238,12 @@ class Identity:
 
     def _moved(self, traits: Traits, person: Person, variance: float) -> Traits:
         rate = max(self.rate, 1.0 / (traits.boxes + 1))
-        clothes, window = traits.clothes, traits.window
-        if person.worn is not None:
-            # The first boxes count by the variance of any light: one of them may be odd.
-            most = self.clear * (variance if traits.boxes >= self.settled else 1.0)
-            clothes = person.worn if clothes is None else mixed(clothes, person.worn, rate, most)
+        clothes, window, first = traits.clothes, traits.window, traits.first
+        if person.worn is not None and (clothes is None or len(first) < self.settled):
+            first = (*first, person.worn)
+            clothes = np.asarray(np.median(first, axis=0))
+        elif person.worn is not None and clothes is not None:
+            clothes = mixed(clothes, person.worn, rate, self.clear * variance)
         if person.tall is not None and abs(math.log(person.tall / window)) < self.stature_sigma:
             window += rate * (person.tall - window)
-        return Traits(person.number, clothes, window, traits.boxes + 1)
+        return Traits(person.number, clothes, window, traits.boxes + 1, first)

@@ -91,8 +91,9 @@ class Identity:
         chances = self._passed(known, people, tracks, walking)
         absent, before, variance = max(1.0 - sum(chances.values()), 1e-6), dict(known.chances), tracks.variance
         others = [self._told_apart(traits, known.traits, variance) for traits in known.others]
+        settling = {person.number for person in seen if self._settles(known.traits, person, tracks)}
         for person in seen:
-            if self._settles(known.traits, person, tracks):
+            if person.number in settling:
                 continue
             stays = before.get(person.number, 0.0) >= self.stays and person.number in walking
             evidence = self._evidence(known.traits, others, person, variance, first=person.age <= 1)
@@ -102,7 +103,7 @@ class Identity:
             chances[number] = odds / total
         known = replace(known, chances=tuple(chances.items()))
         for person in seen:
-            if chances[person.number] >= self.sure:
+            if chances[person.number] >= self.sure or person.number in settling:
                 sure = True
                 traits = self._moved(known.traits, person, variance) if self._is_alone(person, tracks) else known.traits
                 known = replace(known, place=person.track.place, at=person.measured, traits=traits)

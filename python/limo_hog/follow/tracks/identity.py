@@ -91,24 +91,26 @@ class Identity:
         chances = self._passed(known, people, tracks, walking)
         absent, before, variance = max(1.0 - sum(chances.values()), 1e-6), dict(known.chances), tracks.variance
         others = [self._told_apart(traits, known.traits, variance) for traits in known.others]
-        settling = {person.number for person in seen if self._settles(known.traits, person, tracks)}
+        # The first boxes of a track that goes on show what the person looks like: none of them can contradict it.
+        begins = [person for person in seen if person.number == known.traits.number and not person.strained]
+        learns = known.traits.boxes < self.settled
+        settling = [person.number for person in begins if learns and self._is_alone(person, tracks)]
         for person in seen:
             if person.number in settling:
                 continue
             stays = before.get(person.number, 0.0) >= self.stays and person.number in walking
             evidence = self._evidence(known.traits, others, person, variance, first=person.age <= 1)
             chances[person.number] *= math.exp(self.steady * evidence if stays else evidence)
-        total, sure = sum(chances.values()) + absent, False
+        total = sum(chances.values()) + absent
         for number, odds in chances.items():
             chances[number] = odds / total
         known = replace(known, chances=tuple(chances.items()))
+        own = [person for person in seen if chances[person.number] >= self.sure or person.number in settling]
+        for person in own:
+            traits = self._moved(known.traits, person, variance) if self._is_alone(person, tracks) else known.traits
+            known = replace(known, place=person.track.place, at=person.measured, traits=traits)
         for person in seen:
-            if chances[person.number] >= self.sure or person.number in settling:
-                sure = True
-                traits = self._moved(known.traits, person, variance) if self._is_alone(person, tracks) else known.traits
-                known = replace(known, place=person.track.place, at=person.measured, traits=traits)
-        for person in seen:
-            if sure and person.confirmed and chances[person.number] <= 1.0 - self.sure:
+            if own and person.confirmed and chances[person.number] <= 1.0 - self.sure:
                 known = self._other(known, person, variance)
         return known
 
@@ -172,25 +174,15 @@ class Identity:
     def _walks_on(self, person: Person, tracks: Tracks) -> bool:
         """Whether the scan shows that a track's legs are those they were, with nobody's beside them to change with."""
         others = [mover.track.place for mover in tracks.movers if mover.left and mover.number != person.number]
-        for own in tracks.movers:
-            if own.number == person.number and own.felt - own.named >= self.legs_s:
-                here = own.track.place
-                if min([math.dist(here, place) for place in others], default=math.inf) > self.legs_apart:
-                    return True
-        return False
-
-    def _settles(self, traits: Traits, person: Person, tracks: Tracks) -> bool:
-        """Whether a box is one of the first of a track that goes on: it shows what the person followed looks like."""
-        begins = person.number == traits.number and traits.boxes < self.settled
-        return begins and not person.strained and self._is_alone(person, tracks)
+        kept = [mover for mover in tracks.movers if mover.number == person.number]
+        own = [mover.track.place for mover in kept if mover.felt - mover.named >= self.legs_s]
+        return any(all(math.dist(here, place) > self.legs_apart for place in others) for here in own)
 
     def _is_alone(self, person: Person, tracks: Tracks) -> bool:
         """Whether nobody is so near that a person's box may show both or the other."""
         lately = (tracks.stamp or 0.0) - self.unseen_s
-        for other in tracks.people:
-            if other is not person and other.measured >= lately and separation(other, person) <= self.meets:
-                return False
-        return True
+        others = [other for other in tracks.people if other is not person and other.measured >= lately]
+        return all(separation(other, person) > self.meets for other in others)
 
     def _evidence(
         self, own: Traits, others: Sequence[Traits], person: Person, variance: float, *, first: bool

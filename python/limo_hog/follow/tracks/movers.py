@@ -111,12 +111,8 @@ class Movers:
 
     def moving(self, movers: tuple[Mover, ...], since: float = -math.inf) -> list[Mover]:
         """Return those that have moved, and were measured after `since` [s]."""
-        moved = []
-        for mover in movers:
-            way = math.dist(mover.track.mean[:2], mover.began)
-            if mover.left and mover.scans >= self.fewest_scans and mover.felt > since and way > self.least_way:
-                moved.append(mover)
-        return moved
+        left = [mover for mover in movers if mover.left and mover.scans >= self.fewest_scans and mover.felt > since]
+        return [mover for mover in left if math.dist(mover.track.place, mover.began) > self.least_way]
 
     def felt(self, movers: tuple[Mover, ...], now: float) -> Points:
         """Return the places of what a scan has just shown, moving or not, float64 (N, 2) [m], odometry frame."""

@@ -232,7 +232,7 @@ class Identity:
     def _moved(self, traits: Traits, person: Person, variance: float) -> Traits:
         rate = max(self.rate, 1.0 / (traits.boxes + 1))
         clothes, window, first = traits.clothes, traits.window, traits.first
-        if person.worn is not None and (clothes is None or len(first) < self.settled):
+        if person.worn is not None and len(first) < self.settled:
             first = (*first, person.worn)
             clothes = np.asarray(np.median(first, axis=0))
         elif person.worn is not None and clothes is not None:

@@ -46,8 +46,11 @@ class Situation:
             raise ValueError("there is no map yet: ask for `ground`")
         return self.ground
 
-    def is_known_behind(self, poses: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Return whether ground behind poses (..., 3) was seen free, and if somebody can be where not, bool (...)."""
+    def is_known_behind(self, poses: Array, lately_s: float = LATELY_S) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return whether ground behind poses (..., 3) was seen free, and if somebody can be where not, bool (...).
+
+        Where people out of sight can be, it must have been seen so within `lately_s` [s].
+        """
         if self.ground is None:
             return np.ones(poses.shape[:-1], bool), np.zeros(poses.shape[:-1], bool)
         behind = places_behind(DEPTHS, self.robot)
@@ -58,7 +61,7 @@ class Situation:
         hides = np.zeros(len(places), bool)
         for at_x, at_y, reach in self.hiding.tolist():
             hides |= np.hypot(places[:, 0] - at_x, places[:, 1] - at_y) < reach
-        within = np.where(hides, LATELY_S, KNOWN_S)
+        within = np.where(hides, lately_s, KNOWN_S)
         known = self.grid.is_free_since(self.ground, places, self.ground.stamp - within)
         known, risky = known.reshape(x.shape), (hides & ~known).reshape(x.shape)
         return np.asarray(known.all(axis=-1)), np.asarray(risky.any(axis=-1))

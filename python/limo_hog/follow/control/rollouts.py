@@ -57,7 +57,7 @@ class Sampling:
     turn_gain: float = param(4.0, "1/s", "Rate at which an error of direction decays, with strong wheels.", 0.1, 20)
     margin: Margin = field(default_factory=lambda: Margin(0.62, 0.22))
     blind_speed: float = param(0.2, "m/s", "Highest speed backwards onto ground that is not known.", 0, 1)
-    fresh_s: float = param(1.0, "s", "Where somebody out of sight can be, it is known for this time.", 0, 60)
+    fresh_s: float = param(1.0, "s", "How long nobody can have come to ground seen free, to back at full speed.", 0, 60)
 
     times: Array = field(init=False, repr=False, compare=False)  #: When the steps end, float64 (T,) [s].
 

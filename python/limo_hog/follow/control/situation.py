@@ -17,8 +17,6 @@ from limo_hog.follow.space.grid import Grid, Ground
 DEPTHS = (0.1, 0.2, 0.3)
 #: How long ground that was seen free counts as known [s]: a second less than `Guard.memory_s`.
 KNOWN_S = 59.0
-#: The same where a person out of sight can be [s]: a person at .75 m/s comes from 3.5 m away.
-LATELY_S = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,10 +44,10 @@ class Situation:
             raise ValueError("there is no map yet: ask for `ground`")
         return self.ground
 
-    def is_known_behind(self, poses: Array, lately_s: float = LATELY_S) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    def is_known_behind(self, poses: Array, fresh_s: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Return whether ground behind poses (..., 3) was seen free, and if somebody can be where not, bool (...).
 
-        Where people out of sight can be, it must have been seen so within `lately_s` [s].
+        Where people out of sight can be, it must have been seen so within `fresh_s` [s].
         """
         if self.ground is None:
             return np.ones(poses.shape[:-1], bool), np.zeros(poses.shape[:-1], bool)
@@ -61,7 +59,7 @@ class Situation:
         hides = np.zeros(len(places), bool)
         for at_x, at_y, reach in self.hiding.tolist():
             hides |= np.hypot(places[:, 0] - at_x, places[:, 1] - at_y) < reach
-        within = np.where(hides, lately_s, KNOWN_S)
+        within = np.where(hides, fresh_s, KNOWN_S)
         known = self.grid.is_free_since(self.ground, places, self.ground.stamp - within)
         known, risky = known.reshape(x.shape), (hides & ~known).reshape(x.shape)
         return np.asarray(known.all(axis=-1)), np.asarray(risky.any(axis=-1))

@@ -18,7 +18,7 @@ class UnseenGround:
 
     weight: float = param(6.0, "cost", "Cost of backing so all the time.", 0, 100)
     unknown: float = param(0.3, "of 1", "Share that ground counts for that was not seen at all.", 0, 1)
-    fresh_s: float = param(5.0, "s", "How long nobody comes to ground seen free: at .75 m/s, from 3.5 m away.", 0, 60)
+    fresh_s: float = param(5.0, "s", "How long nobody can have come to ground seen free, for this critic.", 0, 60)
     stands: float = param(0.02, "m/s", "A slower robot stands.", 0, 1)
     fades_s: float = param(1.2, "s", "Time constant with which the future counts less.", 0.1, 60)
 

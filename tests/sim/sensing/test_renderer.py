@@ -49,16 +49,23 @@ def rays(columns: NDArray[np.int64], rows: NDArray[np.int64]) -> NDArray[np.floa
 def first_hit(figure: BodyMesh, directions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Depth [m] at which rays from the camera meet a body: capsules as rows of balls, ellipsoids as they are."""
     share = np.linspace(0, 1, 80)[:, None, None]
-    balls = (figure.start + share * (figure.end - figure.start)).reshape(-1, 3)
+    balls = (figure.start + share * (figure.end - figure.start)).reshape(-1, 3) - EYE
     radii = (figure.start_radius + share[..., 0] * (figure.end_radius - figure.start_radius)).reshape(-1)
     nearest = np.full(len(directions), np.inf)
-    solids = [(np.eye(3) / radius, centre) for centre, radius in zip(balls, radii, strict=True)]
-    solids += [(np.linalg.inv(axes), centre) for centre, axes in zip(figure.centre, figure.axes, strict=True)]
-    for shrink, centre in solids:
+
+    def hit(squared: NDArray[np.float64], along: NDArray[np.float64], beside: float) -> None:
+        """Where a depth t solves squared t² - 2 along t + beside = 0, the ray is on the solid's surface."""
+        under = along**2 - squared * beside
+        on = under > 0
+        nearest[on] = np.minimum(nearest[on], (along[on] - np.sqrt(under[on])) / squared[on])
+
+    squared = (directions**2).sum(axis=1)
+    for centre, radius in zip(balls, radii, strict=True):
+        hit(squared, directions @ centre, centre @ centre - radius**2)
+    for centre, axes in zip(figure.centre, figure.axes, strict=True):
+        shrink = np.linalg.inv(axes)
         ahead, offset = directions @ shrink.T, shrink @ (centre - EYE)
-        a, b = (ahead**2).sum(axis=1), ahead @ offset
-        under = b * b - a * ((offset**2).sum() - 1)
-        nearest = np.minimum(nearest, np.where(under > 0, (b - np.sqrt(np.maximum(under, 0))) / a, np.inf))
+        hit((ahead**2).sum(axis=1), ahead @ offset, offset @ offset - 1)
     return nearest
 
 

@@ -42,6 +42,15 @@ def test_a_first_box_that_shows_the_shirt_in_place_of_the_trousers_is_outvoted()
     assert followed(IN_RED[[0, 0]]).traits.clothes == pytest.approx(IN_RED)
 
 
+def test_a_person_whose_legs_go_on_is_learnt_anew_where_most_of_the_first_boxes_were_odd() -> None:
+    known = IDENTITY.begin(person(1, 0.0, clothes=IN_RED[[0, 0]]))
+    for frame in range(1, 91):
+        one = person(1, 0.1 * frame, clothes=IN_RED[[0, 0]] if frame < 7 else IN_RED)
+        known = IDENTITY.update(known, replace(at(0.1 * frame, one), movers=(legs(one, one.seen),)))
+        assert known.of(1) > 0.95
+    assert known.traits.clothes == pytest.approx(IN_RED, abs=0.2)
+
+
 def test_a_person_whose_legs_have_been_the_same_stays_the_person() -> None:
     for with_legs, low, high in ((True, 0.9, 1.0), (False, 0.0, 0.1)):
         known = followed()
@@ -58,7 +67,7 @@ def test_a_person_who_is_hardly_likely_is_known_again_while_their_legs_go_on() -
     for frame in range(11, 21):
         one = person(1, 0.1 * frame)
         known = IDENTITY.update(known, replace(at(0.1 * frame, one), movers=(legs(one, one.seen),)))
-    assert known.of(1) > 0.8
+    assert known.of(1) > 0.7
 
 
 def test_two_alike_side_by_side_hardly_change_places_while_each_has_legs_that_go_on() -> None:
@@ -174,7 +183,7 @@ def test_where_another_wears_the_same_the_clothes_tell_nothing() -> None:
 
 
 def test_the_less_the_boxes_of_one_person_vary_the_more_a_small_difference_tells() -> None:
-    for variance, low, high in ((1.0, 0.6, 1.0), (0.16, 0.0, 0.2)):
+    for variance, low, high in ((1.0, 0.55, 1.0), (0.16, 0.0, 0.2)):
         known = replace(followed(), chances=((1, 0.5),))
         one = replace(person(1, 1.1, clothes=IN_RED - 0.8, age=1), tall=None)
         assert low < IDENTITY.update(known, replace(at(1.1, one), variance=variance)).of(1) < high

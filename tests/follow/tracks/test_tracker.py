@@ -254,8 +254,8 @@ def test_two_returns_within_half_a_stride_are_legs_and_a_wider_group_is_furnitur
     assert not found((2.0, 0.36), (2.0, 0.37))
     assert found((2.0, -0.27), (2.0, 0.27))
     assert not found((2.0, -0.28), (2.0, 0.28))
-    assert found((2.15, 0.0), (2.15, 0.1), x=2.15)
-    assert not found((2.25, 0.0), (2.25, 0.1), x=2.25)
+    assert found((3.45, 0.0), (3.45, 0.1), x=3.45)
+    assert not found((3.55, 0.0), (3.55, 0.1), x=3.55)
 
 
 def test_the_legs_of_a_person_who_walks_trail_by_a_twentieth_of_a_second() -> None:

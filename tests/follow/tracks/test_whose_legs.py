@@ -36,7 +36,7 @@ def test_two_people_side_by_side_have_one_pair_of_legs_each() -> None:
     people = [person(1, 1.6, 0.2, 1.0), person(2, 1.5, 0.35, 1.0)]
     assert [one.number for one in MOVERS.assign(movers, people, 1.0)] == [1, 2]
     # The number goes along with the person, and is given once.
-    later = MOVERS.assign(MOVERS.assign(movers, people, 1.0), [person(1, 1.5, 0.3, 1.0)], 1.0)
+    later = MOVERS.assign(MOVERS.assign(movers, people, 1.0), [person(1, 1.5, 0.42, 1.0)], 1.0)
     assert [one.number for one in later] == [1]
 
 
@@ -118,14 +118,15 @@ def test_legs_within_four_decimetres_of_a_person_are_theirs() -> None:
     assert assigned((replace(walker(None, 2.0, 0.0), felt=0.9),), (7, 2.0, 0.0)) == [None]
 
 
-def test_legs_that_were_anothers_become_a_persons_where_they_are_clearly_nearer() -> None:
-    for off, numbers in ((0.26, [7]), (0.24, [7, 9])):
-        # The other's legs are where the person is; those that were their own are `off` away, or begin again.
-        assert assigned((walker(7, 2.0, 0.0), walker(9, 2.0, off)), (7, 2.0, off)) == numbers
+@pytest.mark.parametrize("whose", [9, None])
+def test_other_legs_become_a_persons_where_they_are_clearly_nearer_than_their_own(whose: int | None) -> None:
+    for off, numbers in ((0.36, [7]), (0.34, [7, whose])):
+        # The other legs are where the person is; those that were their own are `off` away, or begin again.
+        assert assigned((walker(7, 2.0, 0.0), walker(whose, 2.0, off)), (7, 2.0, off)) == numbers
 
 
 def test_the_nearest_legs_are_a_persons_and_those_taken_for_them_before_begin_again() -> None:
-    before = (walker(7, 2.0, 0.3), walker(None, 2.0, 0.02), walker(3, 0.0, 2.0))
+    before = (walker(7, 2.0, 0.38), walker(None, 2.0, 0.02), walker(3, 0.0, 2.0))
     assert assigned(before, (7, 2.0, 0.0)) == [7, 3]
     one = named(replace(before[1], shown=5), 7, 4.0)
     assert (one.number, one.shown, one.named) == (7, 0, 4.0)

@@ -120,7 +120,7 @@ class Legs:
 
     radius: float = param(0.35, "m", "Returns nearer than this to the predicted position are taken for legs.")
     widest: float = param(0.55, "m", "A wider group is a wall or a piece of furniture.")
-    reach: float = param(2.2, "m", "Further away legs are not looked for.")
+    reach: float = param(3.5, "m", "Further away legs are not looked for: there two shins are two beams.")
     sigma: float = param(0.1, "m", "Standard deviation of the middle of two walking legs from the person's axis.")
     trail_s: float = param(0.05, "s", "The middle of the legs is where the person was so long ago.")
     fewest: int = param(2, "1", "Returns that legs have at least.")

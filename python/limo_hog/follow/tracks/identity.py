@@ -30,7 +30,7 @@ class Traits:
     clothes: Clothes | None  #: What is worn; None where no colour image tells.
     window: float  #: Height of the detection window, times the distance [px m]: the stature.
     boxes: int = 1  #: Boxes it was learnt from [1].
-    first: tuple[Clothes, ...] = ()  #: What the first of them showed, of which any may be odd.
+    votes: tuple[Clothes, ...] = ()  #: What ten of them showed, of which any may be odd.
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class Identity:
     """Moves the probabilities from frame to frame."""
 
     sure: float = param(0.95, "1", "From this probability on the person's place, clothes and stature are learnt.")
-    strange: float = param(0.05, "1", "How likely another is to wear just these clothes, at a variance of 1.")
+    strange: float = param(0.1, "1", "How likely another is to wear just these clothes, at a variance of 1.")
     odd: float = param(0.05, "1", "Share of boxes that show something else in the place of the clothes.")
     stature_sigma: float = param(0.05, "1", "Standard deviation of the stature in the depth image, as a share.")
     strange_stature: float = param(0.3, "1", "As `strange`, of the stature.")
@@ -102,12 +102,13 @@ class Identity:
             evidence = self._evidence(known.traits, others, person, variance, first=person.age <= 1)
             chances[person.number] *= math.exp(self.steady * evidence if stays else evidence)
         total = sum(chances.values()) + absent
-        for number, odds in chances.items():
-            chances[number] = odds / total
+        chances = {number: odds / total for number, odds in chances.items()}
         known = replace(known, chances=tuple(chances.items()))
         own = [person for person in seen if chances[person.number] >= self.sure or person.number in settling]
         for person in own:
-            traits = self._moved(known.traits, person, variance) if self._is_alone(person, tracks) else known.traits
+            traits = known.traits
+            if self._is_alone(person, tracks):
+                traits = self._moved(traits, person, variance, goes_on=person.number in walking)
             known = replace(known, place=person.track.place, at=person.measured, traits=traits)
         for person in seen:
             if own and person.confirmed and chances[person.number] <= 1.0 - self.sure:
@@ -229,14 +230,15 @@ class Identity:
         same = ((other.clothes - own.clothes) ** 2).sum(axis=1) < self.clear * variance
         return replace(other, clothes=np.where(same[:, None], own.clothes, other.clothes))
 
-    def _moved(self, traits: Traits, person: Person, variance: float) -> Traits:
+    def _moved(self, traits: Traits, person: Person, variance: float, *, goes_on: bool = False) -> Traits:
+        """Return traits after one more box. While the legs go on, the last boxes outvote what was learnt before."""
         rate = max(self.rate, 1.0 / (traits.boxes + 1))
-        clothes, window, first = traits.clothes, traits.window, traits.first
-        if person.worn is not None and len(first) < self.settled:
-            first = (*first, person.worn)
-            clothes = np.asarray(np.median(first, axis=0))
+        clothes, window, boxes = traits.clothes, traits.window, traits.votes
+        if person.worn is not None and (goes_on or len(boxes) < self.settled):
+            boxes = (*boxes, person.worn)[-self.settled :]
+            clothes = np.asarray(np.median(boxes, axis=0))
         elif person.worn is not None and clothes is not None:
             clothes = mixed(clothes, person.worn, rate, self.clear * variance)
         if person.tall is not None and abs(math.log(person.tall / window)) < self.stature_sigma:
             window += rate * (person.tall - window)
-        return Traits(person.number, clothes, window, traits.boxes + 1, first)
+        return Traits(person.number, clothes, window, traits.boxes + 1, boxes)

@@ -49,8 +49,7 @@ class Movers:
     is still wall. So a group moves only when the place where it began is empty.
     """
 
-    #: How a group is found again, further off than a followed person's legs: at 3.5 m two shins are two beams.
-    legs: Legs = field(default_factory=lambda: Legs(reach=3.5))
+    legs: Legs = field(default_factory=Legs)  #: How a group is found again.
     gap: float = param(0.3, "m", "Returns further apart than this are of two groups.")
     beams: float = param(0.03, "rad", "A beam within this passes a place.")
     fewest_scans: int = param(4, "1", "Scans after which a group counts as moving.")
@@ -59,7 +58,7 @@ class Movers:
     unseen_s: float = param(3.0, "s", "Where the lidar does not look, a group is predicted for this time.")
     looks: int = param(12, "1", "Scans without a person in the camera's view after which it is no more turned to.")
     beside: float = param(0.4, "m", "A person is this far from their own legs at most.")
-    taken: float = param(0.25, "m", "A person must be nearer by this to legs that were another's than to their own.")
+    taken: float = param(0.35, "m", "A person must be nearer by this to other legs than to their own.")
     nearer: float = param(0.15, "m", "A box is on other legs than a person's own if it is nearer to them by this.")
     robot: RobotGeometry = LIMO  #: Where the lidar sits.
 
@@ -125,13 +124,13 @@ class Movers:
         felt = [
             (which, mover.track.mean[:2], mover.number) for which, mover in enumerate(movers) if mover.felt == stamp
         ]
+        walking = {number for _, _, number in felt}
         for who, person in enumerate(seen):
-            here = person.track.place
             for which, place, number in felt:
-                gap = math.dist(here, place)
+                gap = math.dist(person.track.place, place)
                 if gap < self.beside:
-                    taken = self.taken if number not in (None, person.number) else 0.0
-                    pairs.append((gap + taken, who, which))
+                    changes = number != person.number and (number is not None or person.number in walking)
+                    pairs.append((gap + (self.taken if changes else 0.0), who, which))
         numbers: dict[int, int] = {}
         for _, who, which in sorted(pairs):
             if which not in numbers and seen[who].number not in numbers.values():

@@ -42,7 +42,7 @@ def test_a_first_box_that_shows_the_shirt_in_place_of_the_trousers_is_outvoted()
     assert followed(IN_RED[[0, 0]]).traits.clothes == pytest.approx(IN_RED)
 
 
-def test_a_person_whose_legs_go_on_is_learnt_anew_where_most_of_the_first_boxes_were_odd() -> None:
+def test_a_person_of_whom_most_of_the_first_boxes_were_odd_is_learnt_by_the_later_ones() -> None:
     known = IDENTITY.begin(person(1, 0.0, clothes=IN_RED[[0, 0]]))
     for frame in range(1, 91):
         one = person(1, 0.1 * frame, clothes=IN_RED[[0, 0]] if frame < 7 else IN_RED)
@@ -204,7 +204,8 @@ def test_another_is_learnt_by_the_boxes_and_not_by_what_the_track_wore_before() 
 
 def test_where_the_person_is_and_what_they_wear_is_learnt_where_it_is_sure() -> None:
     for chance, learnt in ((0.5, False), (0.999, True)):
-        known = replace(followed(), chances=((1, chance),))
+        known = followed()
+        known = replace(known, traits=replace(known.traits, first=(IN_RED,) * IDENTITY.voters), chances=((1, chance),))
         after = IDENTITY.update(known, at(1.1, replace(person(1, 1.1, 0.7, IN_RED - 0.5), tall=None)))
         assert (after.at == 1.1) == (after.place == (2.0, 0.7)) == learnt
         assert after.traits.clothes is not None

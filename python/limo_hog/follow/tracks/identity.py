@@ -30,7 +30,7 @@ class Traits:
     clothes: Clothes | None  #: What is worn; None where no colour image tells.
     window: float  #: Height of the detection window, times the distance [px m]: the stature.
     boxes: int = 1  #: Boxes it was learnt from [1].
-    votes: tuple[Clothes, ...] = ()  #: What ten of them showed, of which any may be odd.
+    first: tuple[Clothes, ...] = ()  #: What the first of them showed, of which any may be odd.
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,8 @@ class Identity:
     speed: float = param(WALK, "m/s", "And further off by this for each second since.")
     clear: float = param(6.0, "chi² of 3", "A shirt or trousers that differ by more are not learnt.")
     rate: float = param(0.05, "1", "Share by which one box moves clothes and stature once they are learnt.")
-    settled: int = param(10, "1", "Boxes by which it is learnt what a person wears; then what differs clearly is not.")
+    settled: int = param(10, "1", "The first boxes of a person followed, of which none contradicts that it is them.")
+    voters: int = param(30, "1", "Boxes whose median is what a person wears; later what differs clearly is not learnt.")
     remembered: int = param(8, "1", "Other people that are remembered.")
 
     def begin(self, person: Person) -> Likeness:
@@ -106,9 +107,7 @@ class Identity:
         known = replace(known, chances=tuple(chances.items()))
         own = [person for person in seen if chances[person.number] >= self.sure or person.number in settling]
         for person in own:
-            traits = known.traits
-            if self._is_alone(person, tracks):
-                traits = self._moved(traits, person, variance, goes_on=person.number in walking)
+            traits = self._moved(known.traits, person, variance) if self._is_alone(person, tracks) else known.traits
             known = replace(known, place=person.track.place, at=person.measured, traits=traits)
         for person in seen:
             if own and person.confirmed and chances[person.number] <= 1.0 - self.sure:
@@ -230,15 +229,14 @@ class Identity:
         same = ((other.clothes - own.clothes) ** 2).sum(axis=1) < self.clear * variance
         return replace(other, clothes=np.where(same[:, None], own.clothes, other.clothes))
 
-    def _moved(self, traits: Traits, person: Person, variance: float, *, goes_on: bool = False) -> Traits:
-        """Return traits after one more box. While the legs go on, the last boxes outvote what was learnt before."""
+    def _moved(self, traits: Traits, person: Person, variance: float) -> Traits:
         rate = max(self.rate, 1.0 / (traits.boxes + 1))
-        clothes, window, boxes = traits.clothes, traits.window, traits.votes
-        if person.worn is not None and (goes_on or len(boxes) < self.settled):
-            boxes = (*boxes, person.worn)[-self.settled :]
-            clothes = np.asarray(np.median(boxes, axis=0))
+        clothes, window, first = traits.clothes, traits.window, traits.first
+        if person.worn is not None and len(first) < self.voters:
+            first = (*first, person.worn)
+            clothes = np.asarray(np.median(first, axis=0))
         elif person.worn is not None and clothes is not None:
             clothes = mixed(clothes, person.worn, rate, self.clear * variance)
         if person.tall is not None and abs(math.log(person.tall / window)) < self.stature_sigma:
             window += rate * (person.tall - window)
-        return Traits(person.number, clothes, window, traits.boxes + 1, boxes)
+        return Traits(person.number, clothes, window, traits.boxes + 1, first)

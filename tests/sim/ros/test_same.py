@@ -56,15 +56,15 @@ def test_a_model_node_gives_the_same_commands(name: str, tmp_path: Path) -> None
             twist = step.log.decision.twist
             commands.append([round(step.log.time, 2), twist.linear, twist.angular])
 
-    run_script(node, Scenario.load("followable"), 4.0, 3, watch=watch)
+    run_script(node, Scenario.load("followable"), 6.0, 3, watch=watch)
     path = os.pathsep.join([str(ROOT), str(ROOT / "python"), str(ROOT / "sim"), sysconfig.get_path("purelib")])
     model = start(NODES / "model.py", str(node), PYTHONPATH=path, **ALONE)
-    stage = start(NODES / "stage.py", "followable", "3", "4", PYTHONPATH=path, **ALONE)
+    stage = start(NODES / "stage.py", "followable", "3", "6", PYTHONPATH=path, **ALONE)
     try:
         said = json.loads(stage.communicate(timeout=100)[0].splitlines()[-1])
     finally:
         stage.kill()
         model.send_signal(signal.SIGINT)
         model.communicate(timeout=20)
-    assert len(said) > 30
+    assert len(said) > 50
     assert said == commands

@@ -49,7 +49,7 @@ class Movers:
     is still wall. So a group moves only when the place where it began is empty.
     """
 
-    legs: Legs = field(default_factory=Legs)  #: How a group is found again.
+    legs: Legs = field(default_factory=Legs)  #: How a group, or the legs of a tracked person, are found again.
     gap: float = param(0.3, "m", "Returns further apart than this are of two groups.")
     beams: float = param(0.03, "rad", "A beam within this passes a place.")
     fewest_scans: int = param(4, "1", "Scans after which a group counts as moving.")
@@ -124,12 +124,12 @@ class Movers:
         felt = [
             (which, mover.track.mean[:2], mover.number) for which, mover in enumerate(movers) if mover.felt == stamp
         ]
-        walking = {number for _, _, number in felt}
+        with_legs = {number for _, _, number in felt}
         for who, person in enumerate(seen):
             for which, place, number in felt:
                 gap = math.dist(person.track.place, place)
                 if gap < self.beside:
-                    changes = number != person.number and (number is not None or person.number in walking)
+                    changes = number != person.number and (number is not None or person.number in with_legs)
                     pairs.append((gap + (self.taken if changes else 0.0), who, which))
         numbers: dict[int, int] = {}
         for _, who, which in sorted(pairs):

@@ -14,7 +14,7 @@ from limo_hog.follow.sense.measurement import WALK, Measurement, Visibility, mea
 from limo_hog.follow.sense.observation import Clothes, Observation, Odometry, pose_at
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks import kalman
-from limo_hog.follow.tracks.association import Association, Legs, Returns
+from limo_hog.follow.tracks.association import Association, Returns
 from limo_hog.follow.tracks.hiding import Other
 from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, innovation
 from limo_hog.follow.tracks.movers import Mover, Movers, named
@@ -59,7 +59,6 @@ class Tracker:
     noise: Noise = field(default_factory=Noise)  #: The parts, each with its parameters.
     association: Association = field(default_factory=Association)
     existence: Existence = field(default_factory=Existence)
-    legs: Legs = field(default_factory=Legs)
     movers: Movers = field(default_factory=Movers)
     visibility: Visibility = field(default_factory=Visibility)
     forget_s: float = param(8.0, "s", "An unmeasured person is forgotten after this time.")
@@ -200,7 +199,7 @@ class Tracker:
                 # Legs continue a track; after a gap, whatever stands there could be taken for them.
                 break
             if (unseen == 0 or returns.stamp > person.felt) and returns.stamp > now.track.stamp - self.scan_period_s:
-                track = self.legs.update(now.track, returns, self.noise, is_ground)
+                track = self.movers.legs.update(now.track, returns, self.noise, is_ground)
                 now = now if track is None else replace(now, track=track, felt=returns.stamp)
         kept = now if unseen > 0 else replace(person, felt=now.felt)
         people = [kept if other.number == person.number else other for other in tracks.people]
@@ -210,7 +209,7 @@ class Tracker:
         """Bring a person up to the last scan before `stamp` [s] with their legs: between slow frames people turn."""
         for returns in scans:
             if person.confirmed and person.track.stamp < returns.stamp <= stamp and returns.stamp > person.felt:
-                track = self.legs.update(person.track, returns, self.noise)
+                track = self.movers.legs.update(person.track, returns, self.noise)
                 person = person if track is None else replace(person, track=track, felt=returns.stamp)
         return person
 

@@ -28,7 +28,9 @@ def person(
     track = kalman.initiate(stamp, 0.0, 2.0, Odometry(), Noise())
     track = replace(track, mean=(2.0, y, 0.0, 0.0))
     seen = stamp if measured is None else measured
-    return Person(number, track, seen, 5.0, tall, -120.0, True, age, clothes=clothes, worn=clothes, tall=tall)
+    return Person(
+        number, track, seen, 5.0, tall, -120.0, confirmed=True, age=age, clothes=clothes, worn=clothes, tall=tall
+    )
 
 
 def at(stamp: float, *people: Person) -> Tracks:

@@ -20,6 +20,8 @@ PERSON_RADIUS = 0.45
 WALK = 1.0
 #: Height of HOG's window, in statures: the person in it is 96 of 128 px high (Dalal and Triggs 2005).
 WINDOW_PER_STATURE = 4 / 3
+#: Stature of the workshop's person, and the most that anybody is taken to have [m].
+STATURE, TALLEST = 0.9, 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +42,7 @@ class Measurement:
     middle: float = 0.0
     #: Whether that is all of the person: at the image's edge people can only be taller than they show.
     whole: bool = True
+    stature: float = 0.0  #: In the depth image [m]; 0 without one.
 
     def is_low(self, share: float) -> bool:
         """Whether the box sits too low on the person by this share of its height; true where that is not known."""
@@ -68,7 +71,8 @@ def measure(observation: Observation, robot: RobotGeometry) -> list[Measurement]
             stature = robot.camera_z + (observation.height / 2 - top) / observation.focal_px * depth
             window = WINDOW_PER_STATURE * stature * observation.focal_px
             middle = (robot.camera_z - stature / 2) * observation.focal_px
-            seen = Measurement(bearing, distance, height, centre, score, clothes, relief, window, middle, top > 0)
+            sizes = window, middle, top > 0, stature
+            seen = Measurement(bearing, distance, height, centre, score, clothes, relief, *sizes)
         measurements.append(seen)
     return measurements
 

@@ -218,8 +218,10 @@ class Appearance:
         slipped = min(chi_squared(trousers, seen_shirt) / variance, self.max_shirt) + of_trousers
         return min(cost, slipped) if slips else cost
 
-    def learn(self, known: Clothes, seen: Clothes, variance: float = 1.0) -> Clothes:
+    def learn(self, known: Clothes | None, seen: Clothes | None, variance: float = 1.0) -> Clothes | None:
         """Move known clothes towards those in a box; a shirt or trousers that clearly differ are left out."""
+        if known is None or seen is None:
+            return known if seen is None else seen
         return mixed(known, seen, self.rate, (self.max_shirt * variance, self.max_trousers * variance))
 
     def varied(self, variance: float, known: Clothes, seen: Clothes) -> float:

@@ -17,7 +17,7 @@ import numpy as np
 
 from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.clearance import Points
-from limo_hog.follow.sense.measurement import Measurement
+from limo_hog.follow.sense.measurement import STATURE, TALLEST, Measurement
 from limo_hog.follow.sense.observation import Appearance, Array, Clothes, Mask, Odometry
 from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, innovation, predict, update
 from limo_hog.follow.tracks.person import Person, distance_to
@@ -116,7 +116,7 @@ class Returns:
 
 @dataclass(frozen=True, slots=True)
 class Legs:
-    """Finds a tracked person's legs in a scan."""
+    """Finds a tracked person's legs in a scan; the lengths are those of a person `STATURE` high."""
 
     radius: float = param(0.35, "m", "Returns nearer than this to the predicted position are taken for legs.")
     widest: float = param(0.55, "m", "A wider group is a wall or a piece of furniture.")
@@ -124,6 +124,11 @@ class Legs:
     sigma: float = param(0.1, "m", "Standard deviation of the middle of two walking legs from the person's axis.")
     trail_s: float = param(0.05, "s", "The middle of the legs is where the person was so long ago.")
     fewest: int = param(2, "1", "Returns that legs have at least.")
+
+    def of(self, stature: float) -> Legs:
+        """Return the same for a person of a stature [m], up to `TALLEST`: the taller, the longer a stride."""
+        times = min(max(stature, STATURE), TALLEST) / STATURE
+        return replace(self, radius=times * self.radius, widest=times * self.widest, sigma=times * self.sigma)
 
     def update(
         self, track: Track, returns: Returns, noise: Noise, is_ground: Callable[[Points], Mask] | None = None

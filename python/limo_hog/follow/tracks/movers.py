@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import Points, lidar_at
-from limo_hog.follow.sense.measurement import Measurement
+from limo_hog.follow.sense.measurement import STATURE, Measurement
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks import kalman
@@ -39,6 +39,7 @@ class Mover:
     #: Of the person whom the camera showed there last, and since when they are theirs [s]; None if it showed none.
     number: int | None = None
     named: float = math.inf
+    stature: float = STATURE  #: Of that person [m].
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,14 +85,16 @@ class Movers:
         movers = (*people, *[mover for mover in movers if mover.number is None])
         expected = [kalman.predict(mover.track, returns.stamp, noise) for mover in movers]
         gaps = all_distances(points, expected)
-        whose, free, near = self._whose(movers, gaps), np.ones(len(points), bool), gaps < self.legs.radius
+        legs = [self.legs.of(mover.stature) for mover in movers]
+        gaps = np.where(gaps < np.array([found.radius for found in legs])[:, None], gaps, np.inf)
+        whose, free, near = self._whose(movers, gaps), np.ones(len(points), bool), gaps < np.inf
         for index, mover in enumerate(movers):
             own = free if mover.number is None else free & (whose == mover.number)
-            track = self.legs.corrected(expected[index], points[own & near[index]], returns.pose, noise)
+            track = legs[index].corrected(expected[index], points[own & near[index]], returns.pose, noise)
             if track is not None:
                 shown = mover.shown + is_in_view(track, returns, camera, self.robot)
                 kept.append(replace(mover, track=track, felt=returns.stamp, scans=mover.scans + 1, shown=shown))
-                free &= ~own | (distances(points, track) > self.legs.radius)
+                free &= ~own | (distances(points, track) > legs[index].radius)
                 continue
             due = is_in_view(expected[index], returns, lidar, self.robot, self.robot.lidar_yaw)
             if returns.stamp - mover.felt < (self.forget_s if due else self.unseen_s):
@@ -104,7 +107,8 @@ class Movers:
         places = self._groups(returns)
         if ground is not None and len(places):
             places = places[~grid.is_blocked(ground, places, lasting=True)]
-        new = all_distances(places, [*map(attrgetter("track"), kept)]).min(axis=0, initial=np.inf) > self.legs.radius
+        reach = np.array([self.legs.of(mover.stature).radius for mover in kept])[:, None]
+        new = (all_distances(places, [*map(attrgetter("track"), kept)]) > reach).all(axis=0)
         begun = [self._begin(place, returns, noise) for place in places[new]]
         return (*kept, *begun)
 
@@ -131,15 +135,16 @@ class Movers:
                 if gap < self.beside:
                     changes = number != person.number and (number is not None or person.number in with_legs)
                     pairs.append((gap + (self.taken if changes else 0.0), who, which))
-        numbers: dict[int, int] = {}
+        whose: dict[int, int] = {}
         for _, who, which in sorted(pairs):
-            if which not in numbers and seen[who].number not in numbers.values():
-                numbers[which] = seen[who].number
+            if which not in whose and who not in whose.values():
+                whose[which] = who
+        numbers = {seen[who].number for who in whose.values()}
         # What was taken for the person's legs until now, and is no more, was a piece of them, or begins again.
         kept = [
-            named(mover, numbers[which], stamp) if which in numbers else mover
+            named(mover, seen[whose[which]], stamp) if which in whose else mover
             for which, mover in enumerate(movers)
-            if which in numbers or mover.number not in numbers.values()
+            if which in whose or mover.number not in numbers
         ]
         return tuple(kept)
 
@@ -182,7 +187,7 @@ class Movers:
         if len(numbers) == 0:
             return np.zeros(gaps.shape[1], np.int64)
         gaps = gaps[: len(numbers)]
-        return np.where(gaps.min(axis=0) < self.legs.radius, numbers.take(gaps.argmin(axis=0)), 0)
+        return np.where(gaps.min(axis=0) < np.inf, numbers.take(gaps.argmin(axis=0)), 0)
 
     def _passed(self, returns: Returns, places: Points) -> NDArray[np.bool_]:
         """Return whether the beams nearest to each of (N, 2) places end behind it, bool (N,)."""
@@ -228,9 +233,10 @@ class Movers:
         return Mover(track, (float(place[0]), float(place[1])), returns.stamp, returns.stamp)
 
 
-def named(mover: Mover, number: int, stamp: float) -> Mover:
-    """Return what the camera shows to be the legs of the person of a number."""
-    return replace(mover, number=number, shown=0, named=mover.named if mover.number == number else stamp)
+def named(mover: Mover, person: Person, stamp: float) -> Mover:
+    """Return what the camera shows to be a person's legs."""
+    since = mover.named if mover.number == person.number else stamp
+    return replace(mover, number=person.number, stature=person.stature, shown=0, named=since)
 
 
 def is_in_view(track: Track, returns: Returns, half_view: float, robot: RobotGeometry, towards: float = 0.0) -> bool:

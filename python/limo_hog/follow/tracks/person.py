@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass, field, replace
 
 from limo_hog.follow.parameters import param
-from limo_hog.follow.sense.measurement import Measurement
+from limo_hog.follow.sense.measurement import STATURE, Measurement
 from limo_hog.follow.sense.observation import Clothes, Odometry
 from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range
@@ -28,6 +28,7 @@ class Person:
     log_odds: float  #: Of being a person, by all frames in which one should have been found (`Existence`).
     window: float  #: Height of the detection window, and its middle below the image's, times the distance [px m].
     centre: float
+    stature: float = STATURE  #: As far as the depth image shows it [m].
     confirmed: bool = False  #: Whether the log-odds have been high enough, and not too low since.
     age: int = 1  #: Frames in which the person should have been found, and those since they were.
     misses: int = 0

@@ -10,14 +10,14 @@ from operator import attrgetter
 from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import scan_points, to_odometry
-from limo_hog.follow.sense.measurement import WALK, Measurement, Visibility, measure
-from limo_hog.follow.sense.observation import Clothes, Observation, Odometry, pose_at
+from limo_hog.follow.sense.measurement import STATURE, WALK, Measurement, Visibility, measure
+from limo_hog.follow.sense.observation import Observation, Odometry, pose_at
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.association import Association, Returns
 from limo_hog.follow.tracks.hiding import Other
 from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, innovation
-from limo_hog.follow.tracks.movers import Mover, Movers, named
+from limo_hog.follow.tracks.movers import Mover, Movers
 from limo_hog.follow.tracks.person import Existence, Person, Recall, predict
 
 
@@ -64,7 +64,7 @@ class Tracker:
     forget_s: float = param(8.0, "s", "An unmeasured person is forgotten after this time.")
     legs_only_s: float = param(4.0, "s", "A person is followed for this time by legs alone that do not walk.")
     restart_s: float = param(1.0, "s", "A person measured again after this time has a new track.")
-    size_rate: float = param(0.2, "1", "Share by which one box moves a person's size, and clothes at first.")
+    size_rate: float = param(0.2, "1", "Share by which one box moves a person's size.")
     turn_speed: float = param(1.0, "m/s", "Added to the velocity's deviation by a box outside the gate.")
     astray: float = param(0.25, "m", "A box whose range differs by more may be on another person.")
     stature_from: float = param(1.4, "m", "From nearer the outline's top is no measure of the stature.")
@@ -137,21 +137,23 @@ class Tracker:
         window = seen.window or seen.height * distance
         centre = seen.middle if seen.window else seen.centre * distance
         worn, tall = self.association.worn(seen), window if seen.whole and seen.window else None
-        return Person(number, track, stamp, odds, window, centre, clothes=worn, worn=worn, tall=tall)
+        stature = seen.stature or STATURE
+        return Person(number, track, stamp, odds, window, centre, stature, clothes=worn, worn=worn, tall=tall)
 
     def correct(
         self, person: Person, seen: Measurement, pose: Odometry, recall: float = 0.9, variance: float = 1.0
     ) -> Person:
         """Update a person, found with `recall`, by their box, whose clothes have `variance`; both have one stamp."""
-        window, centre = person.window, person.centre
+        window, centre, stature = person.window, person.centre, person.stature
         solid, fits = self.existence.is_solid(seen), self.association.fits_size(person, seen)
         if seen.range is not None and solid:
             # A range that contradicts the size counts too: the size may have been wrong from the beginning.
             if seen.whole:
                 window += self.size_rate * (seen.window - window)
                 centre += self.size_rate * (seen.middle - centre)
+                stature += self.size_rate * (seen.stature - stature)
             elif seen.window > window:
-                window, centre = seen.window, seen.middle
+                window, centre, stature = seen.window, seen.middle, seen.stature
         off = 0.0 if seen.range is None else abs(seen.range - bearing_range(person.track, pose)[1])
         in_place = off < self.astray
         worn = self.association.worn(seen) if fits else None
@@ -173,9 +175,10 @@ class Tracker:
         if strained:
             track = kalman.loosened(track, self.association.same_place, self.turn_speed)
             fit = innovation(track, seen.bearing, seen.range, pose, noise)
-        clothes, track = self._clothes(person, worn, variance), kalman.update(track, fit)
+        clothes = self.association.appearance.learn(person.clothes, worn, variance)
+        track = kalman.update(track, fit)
         person = self.existence.update(person, evidence, found=True)
-        person = replace(person, seen=track.stamp, track=track, window=window, centre=centre)
+        person = replace(person, seen=track.stamp, track=track, window=window, centre=centre, stature=stature)
         return replace(person, clothes=clothes, worn=worn, tall=tall, strained=strained or not in_place)
 
     def follow_legs(self, person: Person, tracks: Tracks, grid: Grid, ground: Ground | None) -> tuple[Person, Tracks]:
@@ -199,7 +202,8 @@ class Tracker:
                 # Legs continue a track; after a gap, whatever stands there could be taken for them.
                 break
             if (unseen == 0 or returns.stamp > person.felt) and returns.stamp > now.track.stamp - self.scan_period_s:
-                track = self.movers.legs.update(now.track, returns, self.noise, is_ground)
+                legs = self.movers.legs.of(person.stature)
+                track = legs.update(now.track, returns, self.noise, is_ground)
                 now = now if track is None else replace(now, track=track, felt=returns.stamp)
         kept = now if unseen > 0 else replace(person, felt=now.felt)
         people = [kept if other.number == person.number else other for other in tracks.people]
@@ -209,7 +213,7 @@ class Tracker:
         """Bring a person up to the last scan before `stamp` [s] with their legs: between slow frames people turn."""
         for returns in scans:
             if person.confirmed and person.track.stamp < returns.stamp <= stamp and returns.stamp > person.felt:
-                track = self.movers.legs.update(person.track, returns, self.noise)
+                track = self.movers.legs.of(person.stature).update(person.track, returns, self.noise)
                 person = person if track is None else replace(person, track=track, felt=returns.stamp)
         return person
 
@@ -223,7 +227,6 @@ class Tracker:
         for returns in new:
             movers = self.movers.update(movers, returns, views, self.noise, grid, ground)
             movers = self.movers.assign(movers, seen, returns.stamp)
-            movers = self._come_back(movers, people, returns.stamp)
             unseen = [person for person in people if person.confirmed and person.seen != tracks.stamp]
             walking = {mover.number for mover in self.movers.moving(movers)} if unseen else set()
             for person in unseen:
@@ -231,23 +234,6 @@ class Tracker:
                     now = self.movers.continued(person, movers, returns, self.noise)
                     people = tuple(now if other is person else other for other in people)
         return replace(tracks, people=people, movers=movers, moved_at=new[-1].stamp)
-
-    def _come_back(self, movers: tuple[Mover, ...], people: tuple[Person, ...], stamp: float) -> tuple[Mover, ...]:
-        """Take legs that began to walk since a person was lost, where that person can be, for theirs.
-
-        Only where they can be one person's alone, and that person has no others to choose from.
-        """
-        since, until = stamp - self.legs_only_s, stamp - self.scan_period_s
-        lost = [person for person in people if person.confirmed and since < person.measured < until]
-        if not lost:
-            return movers
-        walking = [mover for mover in self.movers.moving(movers) if mover.number is None and mover.felt == stamp]
-        pairs = [(person, mover) for person in lost for mover in walking if mover.since > person.measured]
-        pairs = [(person, mover) for person, mover in pairs if self._is_near(person, mover.track)]
-        if len(pairs) != 1:
-            return movers
-        person, legs = pairs[0]
-        return tuple(named(mover, person.number, stamp) if mover is legs else mover for mover in movers)
 
     def around(
         self, tracks: Tracks, followed: Person | None, now: float, lately_s: float
@@ -302,11 +288,3 @@ class Tracker:
         period = tracks.period if tracks.stamp is None else observation.stamp - tracks.stamp
         period = min(max(period, self.min_period_s), self.max_period_s)
         return replace(tracks, poses=poses, scans=scans, stamp=observation.stamp, period=period)
-
-    def _clothes(self, person: Person, worn: Clothes | None, variance: float) -> Clothes | None:
-        """Return a person's clothes after one more box: quickly learnt until they are confirmed, then slowly."""
-        if person.clothes is None or worn is None:
-            return person.clothes if worn is None else worn
-        if person.confirmed:
-            return self.association.appearance.learn(person.clothes, worn, variance)
-        return person.clothes + self.size_rate * (worn - person.clothes)

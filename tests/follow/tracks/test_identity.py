@@ -101,6 +101,15 @@ def test_a_track_kept_by_legs_alone_beside_another_may_not_be_the_person_any_mor
         assert low <= known.of(1) <= high
 
 
+def test_another_in_the_same_clothes_is_not_the_person_whose_legs_go_on_too_near_for_the_camera() -> None:
+    known = followed()
+    for frame in range(11, 80):
+        stamp = 0.1 * frame
+        one = replace(person(1, stamp, measured=1.0), felt=stamp)
+        known = IDENTITY.update(known, replace(at(stamp, one, person(2, stamp, 2.0)), movers=(legs(one, stamp),)))
+    assert known.of(1) > 0.95
+
+
 def test_a_lost_person_is_known_again_by_the_clothes_and_another_is_not() -> None:
     for clothes, low, high in ((IN_RED, 0.8, 1.0), (IN_GREEN, 0.0, 0.2)):
         known = followed()

@@ -109,8 +109,12 @@ class Identity:
         for person in own:
             traits = self._moved(known.traits, person, variance) if self._is_alone(person, tracks) else known.traits
             known = replace(known, place=person.track.place, at=person.measured, traits=traits)
+        # While it is sure where the person is, by legs alone too, whoever else is seen is another.
+        lately = (tracks.stamp or 0.0) - self.unseen_s
+        felt = [person.number for person in tracks.people if person.number in walking and person.measured >= lately]
+        is_sure = bool(own) or any(chances[number] >= self.sure for number in felt)
         for person in seen:
-            if own and person.confirmed and chances[person.number] <= 1.0 - self.sure:
+            if is_sure and person.confirmed and chances[person.number] <= 1.0 - self.sure:
                 known = self._other(known, person, variance)
         return known
 

@@ -240,7 +240,7 @@ def test_it_keeps_further_off_a_person_who_walks_where_the_images_come_late() ->
     kept = []
     for period in (0.1, 0.4):
         world = World(person=(2.5, -1.0), velocity=(0.0, 0.5), period=period)
-        kept.append(there(run(world, 4.0).belief.keeps))
+        kept.append(there(run(world, 5.0).belief.keeps))
     assert kept[0] == pytest.approx(CONTROLLER.target_distance)
     assert kept[1] > CONTROLLER.target_distance + 0.1
 
@@ -255,6 +255,18 @@ def test_how_fast_a_person_walks_is_learnt_and_remembered_while_they_stand() -> 
     stood = run(world, 3.0, walked).state
     assert walked.brisk == pytest.approx(0.6, abs=0.15)
     assert stood.brisk == pytest.approx(walked.brisk, abs=0.05)
+
+
+def test_how_fast_the_person_walks_is_not_learnt_from_a_track_that_may_be_anothers() -> None:
+    world = World(person=(2.0, -1.0), velocity=(0.0, 0.5))
+    slow = run(world, 3.0).state
+    for sure in (True, False):
+        fast, state = replace(world, velocity=(0.0, 1.2)), slow
+        for _ in range(8):
+            assert state.choice.likeness is not None
+            likeness = replace(state.choice.likeness, chances=((1, 1.0 if sure else 0.7),))
+            state = run(fast, 0.1, replace(state, choice=replace(state.choice, likeness=likeness))).state
+        assert (state.brisk > slow.brisk + 0.2) == sure
 
 
 def test_where_no_way_is_free_it_stands() -> None:

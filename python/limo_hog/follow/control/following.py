@@ -55,7 +55,7 @@ class Following:
     headway_s: float = param(1.9, "s", "A person who walks fast is kept off by this part of their way.", 0, 5)
     most_headway: float = param(3.0, "m", "But no further: further off HOG soon finds nobody.", 0.5, 8)
     rise: float = param(0.15, "of 1", "Share by which a faster frame moves the speed they are known to walk at.", 0, 1)
-    fall: float = param(0.0015, "of 1", "Share by which a slower frame moves it.", 0, 1)
+    fall: float = param(0.01, "of 1", "Share by which a slower frame, in which they walk, moves it.", 0, 1)
     prompt_s: float = param(0.1, "s", "An image this late costs no distance.", 0, 5)
     near_hiding: float = param(1.2, "m", "Distance to hold to a person who will soon be out of sight.", 0.5, 8)
     foresight_s: float = param(1.0, "s", "How soon that is, in their way.", 0, 5)

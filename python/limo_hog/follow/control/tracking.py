@@ -209,10 +209,12 @@ class TrackingController:
 
         Only a measured bearing tells the side: a predicted one changes sign as the robot turns past it.
         """
-        following, track, brisk = self.following, person.track, state.brisk
-        known = track if person.confirmed and self._is_sure(person, state) else state.known
+        following, track, known, brisk = self.following, person.track, state.known, state.brisk
         speed, (rate, _) = math.hypot(*track.mean[2:]), rates(track, situation.pose)
-        brisk += (following.rise if speed > brisk else following.fall) * (speed - brisk)
+        if person.confirmed and self._is_sure(person, state):
+            known = track
+            if speed > self.slowest:
+                brisk += (following.rise if speed > brisk else following.fall) * (speed - brisk)
         side = math.copysign(1.0, rate if abs(rate) > following.steady_bearing_rate else bearing)
         return replace(state, side=side, known=known, hunt=None, brisk=brisk)
 

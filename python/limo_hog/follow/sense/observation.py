@@ -224,8 +224,10 @@ class Appearance:
             return known if seen is None else seen
         return mixed(known, seen, self.rate, (self.max_shirt * variance, self.max_trousers * variance))
 
-    def varied(self, variance: float, known: Clothes, seen: Clothes) -> float:
+    def varied(self, variance: float, known: Clothes | None, seen: Clothes | None) -> float:
         """Return the variance after one more box of a person in known clothes."""
+        if known is None or seen is None:
+            return variance
         off = min(float(((seen - known) ** 2).mean()), self.odd * variance)
         return max(self.memory * variance + (1.0 - self.memory) * off, self.least)
 

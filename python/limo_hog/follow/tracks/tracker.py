@@ -81,11 +81,9 @@ class Tracker:
         """Bring all tracks up to a frame; also number -> index of the box of each person found."""
         tracks = self._remember(observation, tracks)
         stamp, pose = observation.stamp, pose_at(tracks.poses, observation.stamp)
-        known = list[Person]()
-        for person in tracks.people:
-            if stamp - person.measured < self.forget_s:
-                person = self._walked(person, tracks.scans, stamp) if observation.between else person
-                known.append(predict(person, stamp, self.noise))
+        known = [person for person in tracks.people if stamp - person.measured < self.forget_s]
+        scans = tracks.scans if observation.between else ()
+        known = [predict(self._walked(person, scans, stamp), stamp, self.noise) for person in known]
         measured = measure(observation, self.robot)
         flat = {which for which, seen in enumerate(measured) if not self.existence.is_solid(seen)}
         moving = self.movers.moving(tracks.movers, stamp - self.movers.forget_s)
@@ -108,9 +106,8 @@ class Tracker:
             if who in pairs:
                 boxes[person.number] = pairs[who]
                 person = self.correct(person, measured[pairs[who]], pose, chance, tracks.variance)
-                before = known[who].clothes
-                if person.confirmed and not person.strained and before is not None and person.worn is not None:
-                    variance = self.association.appearance.varied(variance, before, person.worn)
+                if person.confirmed and not person.strained:
+                    variance = self.association.appearance.varied(variance, known[who].clothes, person.worn)
             elif expected and (not person.confirmed or stamp - person.measured < self.restart_s):
                 # Later than that it shows only that the person walked on, not that there is none. Legs that walk show
                 # that there is one.
@@ -124,8 +121,8 @@ class Tracker:
                 people.append(self.begin(number, seen, stamp, pose))
                 boxes[number] = which
                 number += 1
-        tracks = replace(tracks, people=tuple(people), next_number=number, boxes=tuple(boxes.items()))
-        return replace(tracks, recall=recall, variance=variance), boxes
+        learnt = replace(tracks, recall=recall, variance=variance)
+        return replace(learnt, people=tuple(people), next_number=number, boxes=tuple(boxes.items())), boxes
 
     def begin(self, number: int, seen: Measurement, stamp: float, pose: Odometry) -> Person:
         """Begin to track a box that belongs to no known person."""

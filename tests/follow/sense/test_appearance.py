@@ -53,12 +53,12 @@ def test_slow_change_is_learnt_and_another_shirt_is_not() -> None:
     red, blue, green = (worn(dressed(BOX, shirt, BLUE)) for shirt in (RED, BLUE, GREEN))
     dusk = worn((dressed(BOX, RED, BLUE) * 0.6).astype(np.uint8))
     quick = Appearance(rate=0.5)
-    kept = quick.learn(red, green), quick.learn(red, blue)
+    after_green, after_blue = quick.learn(red, green), quick.learn(red, blue)
     assert APPEARANCE.cost(quick.learn(red, dusk), dusk) < APPEARANCE.cost(red, dusk)
     assert quick.learn(red, red) == pytest.approx(red)
-    for one in kept:
-        assert one is not None
-        assert np.array_equal(one[0], red[0])
+    for clothes in (after_green, after_blue):
+        assert clothes is not None
+        assert np.array_equal(clothes[0], red[0])
 
 
 @pytest.mark.parametrize("box", [(900, 100, 60, 120), (200, -300, 60, 120), (0, 0, 0, 0), (-400, 0, 100, 200)])

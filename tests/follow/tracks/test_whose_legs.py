@@ -48,9 +48,9 @@ def test_the_legs_of_a_tall_person_are_found_as_far_apart_as_their_stride() -> N
         movers = update((), 0.0, *standing)
         movers = MOVERS.assign(movers, [tall], 0.0)
         movers = update(movers, SCAN_S, *stride)
-        own = next(one for one in movers if one.number == 7)
+        (legs_of_7,) = [mover for mover in movers if mover.number == 7]
         # Both feet draw the track to their middle at 2.9 m, the standing foot alone away from it.
-        assert (own.track.mean[0] < 3.0) == (stature > 1), stature
+        assert (legs_of_7.track.mean[0] < 3.0) == (stature > 1), stature
         assert len(movers) == (1 if stature > 1 else 2)
 
 

@@ -85,16 +85,16 @@ class Movers:
         movers = (*people, *[mover for mover in movers if mover.number is None])
         expected = [kalman.predict(mover.track, returns.stamp, noise) for mover in movers]
         gaps = all_distances(points, expected)
-        legs = [self.legs.of(mover.stature) for mover in movers]
-        gaps = np.where(gaps < np.array([found.radius for found in legs])[:, None], gaps, np.inf)
+        legs = {mover.stature: self.legs.of(mover.stature) for mover in movers}
+        gaps = np.where(gaps < np.array([legs[mover.stature].radius for mover in movers])[:, None], gaps, np.inf)
         whose, free, near = self._whose(movers, gaps), np.ones(len(points), bool), gaps < np.inf
         for index, mover in enumerate(movers):
             own = free if mover.number is None else free & (whose == mover.number)
-            track = legs[index].corrected(expected[index], points[own & near[index]], returns.pose, noise)
+            track = legs[mover.stature].corrected(expected[index], points[own & near[index]], returns.pose, noise)
             if track is not None:
                 shown = mover.shown + is_in_view(track, returns, camera, self.robot)
                 kept.append(replace(mover, track=track, felt=returns.stamp, scans=mover.scans + 1, shown=shown))
-                free &= ~own | (distances(points, track) > legs[index].radius)
+                free &= ~own | (distances(points, track) > legs[mover.stature].radius)
                 continue
             due = is_in_view(expected[index], returns, lidar, self.robot, self.robot.lidar_yaw)
             if returns.stamp - mover.felt < (self.forget_s if due else self.unseen_s):
@@ -107,7 +107,7 @@ class Movers:
         places = self._groups(returns)
         if ground is not None and len(places):
             places = places[~grid.is_blocked(ground, places, lasting=True)]
-        reach = np.array([self.legs.of(mover.stature).radius for mover in kept])[:, None]
+        reach = np.array([legs[mover.stature].radius for mover in kept])[:, None]
         new = (all_distances(places, [*map(attrgetter("track"), kept)]) > reach).all(axis=0)
         begun = [self._begin(place, returns, noise) for place in places[new]]
         return (*kept, *begun)

@@ -194,12 +194,6 @@ def test_people_who_would_be_met_in_two_seconds_hardly_count() -> None:
     assert plan.twist.linear > 0.3
 
 
-def test_it_drives_on_from_somebody_close_behind() -> None:
-    # Behind it neither lidar nor camera looks: that one is further off than thought, and may yet be escaped from.
-    plan = PLANNER.plan(situation((-0.3, 0.0, 0.7, 0.0), speed=0.4), Goal(0.0), Manoeuvre(0.0, 0.8))
-    assert plan.twist.linear > 0.4
-
-
 def test_in_mind_the_robot_brakes_no_faster_than_its_wheels_can() -> None:
     seen = situation(points=wall(0.6, half=0.6), speed=0.8)
     rollouts = PLANNER.sampling.roll_out(seen, towards(3.0), DIRECT)

@@ -28,7 +28,7 @@ class RoomToOthers(Room):
     def cost(self, rollouts: Rollouts, situation: Situation) -> Array:
         """Return the cost of each rollout before its weight, float64 (K,) [m]."""
         x, y, vx, vy = situation.people.T
-        # Those who walk away are not fled from.
-        comes = x * vx + y * vy < 0
+        # Those who walk away, or touch the robot already, are not fled from: they walk on by themselves.
+        comes = (x * vx + y * vy < 0) & (np.hypot(x, y) > self.touches + situation.robot.half_length)
         comes[[] if situation.followed is None else situation.followed] = False
         return self.short(rollouts, np.flatnonzero(comes).tolist(), situation)

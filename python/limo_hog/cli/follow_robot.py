@@ -33,7 +33,7 @@ from limo_hog.cli.support.progress import progress
 from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.pipeline import FrameLog
 from limo_hog.follow.robot import LIMO, load_robot
-from limo_hog.follow.sense.detectors import detector_named
+from limo_hog.named_detectors import detector_named
 from limo_hog.ros2.dds import Bus
 from limo_hog.ros2.follower import Report, Settings, drive
 from limo_hog.ros2.network import BusError

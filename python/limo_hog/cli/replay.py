@@ -20,7 +20,7 @@ from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress
 from limo_hog.follow.control.naming import CONTROLLERS, controller_named
 from limo_hog.follow.robot import LIMO, load_robot
-from limo_hog.follow.sense.detectors import detector_named
+from limo_hog.named_detectors import detector_named
 
 if TYPE_CHECKING:
     from limo_hog.ros2.bag import Record

@@ -11,7 +11,7 @@ from limo_hog.cli.support.page import HERE, PORT
 from limo_hog.cli.support.progress import progress
 from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.decision import made_for
-from limo_hog.follow.sense.detectors import detector_named
+from limo_hog.named_detectors import detector_named
 from limo_sim.cli.watching import add_scenario, add_watching, finish, observing, shown_unasked
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ from limo_hog.cli.support.console import console
 from limo_hog.cli.support.output import STDOUT, UsageError, write_json
 from limo_hog.cli.support.progress import progress
 from limo_hog.follow.control.naming import CONTROLLERS
-from limo_hog.follow.sense.detectors import detector_named
+from limo_hog.named_detectors import detector_named
 from limo_hog.parallel import cores
 
 if TYPE_CHECKING:

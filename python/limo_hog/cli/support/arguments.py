@@ -139,7 +139,7 @@ def add_target_and_detector(parser: ArgumentParser) -> None:
 
 def add_detector(parser: ArgumentParser) -> None:
     """Add --detector."""
-    from limo_hog.follow.sense.detectors import NAMES
+    from limo_hog.named_detectors import NAMES
 
     parser.add_argument(
         "--detector",

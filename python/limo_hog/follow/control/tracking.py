@@ -18,9 +18,9 @@ from limo_hog.follow.decision import Belief, Decision, Mode
 from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import LIMO, RobotGeometry, Twist
 from limo_hog.follow.sense.clearance import NO_POINTS, DepthGrid, from_odometry, scan_points, to_odometry
-from limo_hog.follow.sense.detectors import Region
 from limo_hog.follow.sense.measurement import PERSON_RADIUS, RegionSize
 from limo_hog.follow.sense.observation import Observation, pose_at
+from limo_hog.follow.sense.region import Region
 from limo_hog.follow.space.grid import Grid
 from limo_hog.follow.tracks.asking import Whom, named
 from limo_hog.follow.tracks.hiding import Hiding

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog import _core
 from limo_hog.atomic import is_utf8
 from limo_hog.detections import Detections, Detector
 from limo_hog.exceptions import LimoHogError
@@ -74,6 +75,19 @@ class HalfSize:
         half = ((rows[:, 0:width:2] + rows[:, 1:width:2] + 2) >> 2).astype(np.uint8)
         found = self.detector.detect(half)
         return replace(found, windows=found.windows * 2)
+
+
+@dataclass(frozen=True)
+class DoubleSize:
+    """Search the image at twice its size, for people half as high; four times the work."""
+
+    detector: Detector
+
+    def detect(self, image: Image) -> Detections:
+        """Find people, best first; windows are in the image as it is."""
+        height, width = image.shape[:2]
+        found = self.detector.detect(_core.resize(image, 2 * width, 2 * height))
+        return replace(found, windows=found.windows // 2)
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from typing import Any
 
 from limo_hog.atomic import whole_file
 from limo_hog.cli.support.progress import progress
+from limo_hog.follow.control.naming import detector_of
 from limo_hog.parallel import cores
 from limo_sim.run.provenance import code_version
 from limo_sim.run.score import ScoreCard
@@ -57,7 +58,7 @@ def main() -> None:
     known = kept(args.cards)
     runs = {
         controller: [
-            Run(str(suite.path(entry)), controller, "hog", seed, suite.seconds)
+            Run(str(suite.path(entry)), controller, detector_of(controller), seed, suite.seconds)
             for seed in range(args.seeds)
             for entry in suite.scenarios
         ]

@@ -29,7 +29,7 @@ from scipy.optimize import minimize
 from limo_hog import PeopleDetector
 from limo_hog.atomic import whole_file
 from limo_hog.detections import Detections, Detector
-from limo_hog.follow.sense.detectors import detector_named
+from limo_hog.named_detectors import detector_named
 from limo_hog.suppression import intersection_over_union
 from limo_sim.run.arena import Arena
 from limo_sim.run.detector_faults import FIT_FILE, Curve, FaultySearch

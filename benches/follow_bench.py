@@ -31,6 +31,7 @@ import limo_hog
 from limo_hog.atomic import whole_file
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow import detector_named
+from limo_hog.follow.control.naming import detector_of
 from limo_hog.parallel import cores
 from limo_sim.run.arena import Arena
 from limo_sim.run.baselines import controller_of
@@ -172,8 +173,9 @@ def play(run: Play) -> dict[str, Any]:
         names = (run.controller, "truth")
         episode = drive(arena, oracle(run.controller, arena), run.seconds, names=names, watch=watch)
     else:
-        controller, names = controller_of(run.controller), (run.controller, "hog")
-        episode = run_episode(scenario, controller, detector_named("hog"), run.seconds, seed, names=names, watch=watch)
+        controller, names = controller_of(run.controller), (run.controller, detector_of(run.controller))
+        detector = detector_named(names[1])
+        episode = run_episode(scenario, controller, detector, run.seconds, seed, names=names, watch=watch)
     card = score(episode).to_json()
     own, pushed = contacts_by(steps)
     followed = first_followed(steps)

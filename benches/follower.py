@@ -23,6 +23,7 @@ import numpy as np
 
 import limo_hog
 from limo_hog.follow import controller_named, detector_named
+from limo_hog.follow.control.naming import detector_of
 from limo_hog.follow.safety import Guard
 from limo_sim.run.episode import run_episode, score
 from limo_sim.run.log import Step
@@ -48,10 +49,10 @@ def play(kind: str, controller: str, seed: int, seconds: float, target: float | 
         episode = run_episode(
             scenario,
             controller_named(controller, target),
-            detector_named("hog"),
+            detector_named(detector_of(controller)),
             seconds,
             seed,
-            names=(controller, "hog"),
+            names=(controller, detector_of(controller)),
             watch=lambda step: steps.append(step.bare()),
         )
     scorer = Scorer(episode.scenario, dataclasses.replace(CRITERIA, found_within_s=FOUND_WITHIN_S))

@@ -11,7 +11,7 @@ from rich.console import Console
 from tests.answers import AnswerTo
 
 from limo_hog.follow.control.naming import controller_named
-from limo_hog.follow.sense.detectors import detector_named
+from limo_hog.named_detectors import detector_named
 from limo_sim.cli.card import picture
 from limo_sim.run.episode import run_episode, score
 from limo_sim.run.score import ScoreCard

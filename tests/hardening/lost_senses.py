@@ -18,7 +18,7 @@ import cv2
 
 import limo_hog
 from limo_hog.follow import Decision, Follower, Frame, TrackingController, Twist
-from limo_hog.follow.sense.detectors import detector_named
+from limo_hog.named_detectors import detector_named
 from limo_hog.ros2 import messages, names
 from limo_hog.ros2.senses import Senses, picture_of
 from limo_sim.ros.outlet import Outlet

@@ -30,10 +30,10 @@ from limo_hog.cli.support.arguments import (
 )
 from limo_hog.cli.support.output import STDOUT
 from limo_hog.cli.support.progress import progress
-from limo_hog.follow.control.naming import controller_named
+from limo_hog.follow.control.naming import controller_named, detector_of
 from limo_hog.follow.pipeline import FrameLog
 from limo_hog.follow.robot import LIMO, load_robot
-from limo_hog.follow.sense.detectors import detector_named
+from limo_hog.named_detectors import detector_named
 from limo_hog.ros2.dds import Bus
 from limo_hog.ros2.follower import Report, Settings, drive
 from limo_hog.ros2.network import BusError
@@ -74,6 +74,7 @@ def run(args: argparse.Namespace) -> int:
     controller = controller_named(args.controller, args.target, args.person)
     robot = load_robot(args.robot) if args.robot else LIMO
     robot = replace(robot, max_speed=min(robot.max_speed, args.max_speed), max_turn=min(robot.max_turn, args.max_turn))
+    args.detector = args.detector or detector_of(args.controller)
     detector = detector_named(args.detector)
     bus = Bus(node_of(args, "limo_hog_follower"))
     for name in bus.node.parameters.keys() - FRAMES.keys() - {"use_sim_time"}:

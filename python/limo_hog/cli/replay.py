@@ -18,9 +18,9 @@ from limo_hog.cli.support.arguments import add_detector, add_json, add_robot, ad
 from limo_hog.cli.support.console import console
 from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress
-from limo_hog.follow.control.naming import CONTROLLERS, controller_named
+from limo_hog.follow.control.naming import CONTROLLERS, controller_named, detector_of
 from limo_hog.follow.robot import LIMO, load_robot
-from limo_hog.follow.sense.detectors import detector_named
+from limo_hog.named_detectors import detector_named
 
 if TYPE_CHECKING:
     from limo_hog.ros2.bag import Record
@@ -58,6 +58,7 @@ def run(args: argparse.Namespace) -> int:
     from limo_hog.ros2.bag import read_bag
     from limo_hog.ros2.replay import elsewhere, kind_of, replay
 
+    args.detector = args.detector or detector_of(args.controller)
     detector, controller = detector_named(args.detector), controller_named(args.controller)
     node, robot = node_of(args, "limo_hog_follower"), load_robot(args.robot) if args.robot else LIMO
     kinds: dict[str, str] = {}

@@ -8,9 +8,10 @@ from limo_hog.follow.decision import Controller, Decision, Mode
 from limo_hog.follow.pipeline import Follower, FrameLog
 from limo_hog.follow.robot import LIMO, RobotError, RobotGeometry, Twist, load_robot
 from limo_hog.follow.safety import Guard
-from limo_hog.follow.sense.detectors import Region, detector_named
 from limo_hog.follow.sense.measurement import Zone, person_depth, zone_of
 from limo_hog.follow.sense.observation import Frame, Observation, Odometry, Scan, Sensors
+from limo_hog.follow.sense.region import Region
+from limo_hog.named_detectors import detector_named
 
 __all__ = [
     "CONTROLLERS", "LIMO", "ApproachController", "Controller", "Decision", "Detector", "Follower", "Frame",

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.robot import LIMO, RobotError, RobotGeometry, Twist
-from limo_hog.follow.sense.detectors import Region
 from limo_hog.follow.sense.observation import Observation
+from limo_hog.follow.sense.region import Region
 
 S = TypeVar("S")
 

@@ -15,8 +15,8 @@ from limo_hog.follow.decision import Controller, Decision, made_for
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.safety import Guard
 from limo_hog.follow.sense.clearance import completed
-from limo_hog.follow.sense.detectors import Region, detect_in
 from limo_hog.follow.sense.observation import Frame, Observation, Odometry, Scan, Sensors, clothes_in
+from limo_hog.follow.sense.region import Region, detect_in
 from limo_hog.follow.tracks.asking import Whom
 
 S = TypeVar("S")

@@ -9,9 +9,9 @@ from limo_hog.cli.support.arguments import add_follower, add_json
 from limo_hog.cli.support.output import STDOUT
 from limo_hog.cli.support.page import HERE, PORT
 from limo_hog.cli.support.progress import progress
-from limo_hog.follow.control.naming import controller_named
+from limo_hog.follow.control.naming import controller_named, detector_of
 from limo_hog.follow.decision import made_for
-from limo_hog.follow.sense.detectors import detector_named
+from limo_hog.named_detectors import detector_named
 from limo_sim.cli.watching import add_scenario, add_watching, finish, observing, shown_unasked
 
 if TYPE_CHECKING:
@@ -44,6 +44,7 @@ def run(args: argparse.Namespace) -> int:
         args.view = HERE, 0
     scenario = of_run(Scenario.load(args.scenario, args.robot), args.seed)
     controller = Tunable(made_for(controller_named(args.controller, args.target, args.person), scenario.robot.geometry))
+    args.detector = args.detector or detector_of(args.controller)
     detector = detector_named(args.detector)
     with observing(args, scenario, controller) as observers:
         with progress("s") as bar:

@@ -19,8 +19,8 @@ from limo_hog.cli.support.arguments import count, file_ending, seconds, seed
 from limo_hog.cli.support.console import console
 from limo_hog.cli.support.output import STDOUT, UsageError, write_json
 from limo_hog.cli.support.progress import progress
-from limo_hog.follow.control.naming import CONTROLLERS
-from limo_hog.follow.sense.detectors import detector_named
+from limo_hog.follow.control.naming import CONTROLLERS, detector_of
+from limo_hog.named_detectors import detector_named
 from limo_hog.parallel import cores
 
 if TYPE_CHECKING:
@@ -150,12 +150,12 @@ def _runs(args: argparse.Namespace, suite: Suite | None) -> list[Run]:
         if title in called:
             raise UsageError(f"{name}: is called {title!r}, as {called[title]} is; give it another name")
         called[title] = name
-    detector_named(args.detector)
     for name in args.controller:
+        detector_named(args.detector or detector_of(name))
         controller_of(name, args.target)
     duration = suite.seconds if suite is not None else args.seconds or _SECONDS
     return [
-        Run(scenario, controller, args.detector, number, duration, args.target, args.robot)
+        Run(scenario, controller, args.detector or detector_of(controller), number, duration, args.target, args.robot)
         for scenario in scenarios
         for controller in args.controller
         for number in range(args.seed_start, args.seed_start + args.seeds)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.detections import Detections, Detector
-from limo_hog.follow.sense.detectors import Region, detect_in, is_halved
+from limo_hog.follow.sense.region import Region, detect_in, is_halved
 from limo_sim.run.matching import NO_PERSON, person_of
 from limo_sim.sensing.camera import HEIGHT, WIDTH
 from limo_sim.world.scenario import DetectorFaults, Scenario

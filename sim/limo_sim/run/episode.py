@@ -9,8 +9,8 @@ from typing import Any
 from limo_hog.detections import Detector
 from limo_hog.follow.decision import Controller
 from limo_hog.follow.pipeline import Follower, Search
-from limo_hog.follow.sense.detectors import detect_in
 from limo_hog.follow.sense.observation import Sensors
+from limo_hog.follow.sense.region import detect_in
 from limo_sim.run.arena import Arena
 from limo_sim.run.detector_faults import FaultySearch
 from limo_sim.run.log import Passed, Step, Watch

@@ -13,7 +13,7 @@ from typing import TypeVar
 
 import limo_hog
 from limo_hog.exceptions import LimoHogError
-from limo_hog.follow.sense.detectors import detector_named
+from limo_hog.named_detectors import detector_named
 from limo_hog.signals import end_with
 from limo_sim.run.baselines import controller_of
 from limo_sim.run.episode import run_episode, score

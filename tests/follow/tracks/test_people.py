@@ -9,9 +9,9 @@ from tests.follow.tracks.people import IN_GREEN, IN_RED, NOISE, POSE, WINDOW, a_
 from tests.follow.views import boxes, flat, look, scan_of
 
 from limo_hog.follow.robot import LIMO
-from limo_hog.follow.sense.detectors import Region
 from limo_hog.follow.sense.measurement import Measurement, Visibility, measure
 from limo_hog.follow.sense.observation import Odometry
+from limo_hog.follow.sense.region import Region
 from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.person import Person, distance_to, predict
 from limo_hog.follow.tracks.tracker import Tracker, Tracks

@@ -18,8 +18,8 @@ from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.decision import Believed, Mode
 from limo_hog.follow.pipeline import FrameLog
 from limo_hog.follow.robot import LIMO, Twist
-from limo_hog.follow.sense.detectors import detector_named
 from limo_hog.follow.sense.observation import Scan
+from limo_hog.named_detectors import detector_named
 from limo_hog.ros2 import dds, findings, follower, frames, messages, names
 from limo_hog.ros2.bag import to_detections
 from limo_hog.ros2.outputs import Commands

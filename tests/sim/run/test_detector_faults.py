@@ -13,7 +13,8 @@ from tests.sim.logs import Finds, figures
 
 from limo_hog.detections import Detections, Detector
 from limo_hog.follow import ApproachController, TrackingController
-from limo_hog.follow.sense.detectors import HalfSize, Region, detector_named
+from limo_hog.follow.sense.region import Region
+from limo_hog.named_detectors import HalfSize, detector_named
 from limo_sim.env import LimoFollowV1
 from limo_sim.ros.live import run_live
 from limo_sim.ros.runner import run_node

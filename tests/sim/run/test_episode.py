@@ -12,7 +12,7 @@ from tests.sim.logs import Finds, commands, drive, figures, steps_of
 
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow import ApproachController, Mode, ProxemicController, TrackingController, Twist, controller_named
-from limo_hog.follow.sense.detectors import detector_named
+from limo_hog.named_detectors import detector_named
 from limo_sim.run.arena import Arena
 from limo_sim.run.episode import Episode, run_episode, score
 from limo_sim.view.tuning import Tunable

@@ -13,7 +13,7 @@ from tests.sim.logs import there
 from limo_hog._core import Canvas
 from limo_hog.exceptions import ParameterError
 from limo_hog.follow.robot import LIMO
-from limo_hog.follow.sense.detectors import detector_named
+from limo_hog.named_detectors import detector_named
 from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, CameraPose
 from limo_sim.sensing.renderer import Renderer, Seen
 from limo_sim.world.furniture import KINDS, Box

@@ -11,10 +11,10 @@ from tests.sim.view.browser import CHROMIUM, chromium, played
 
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import ControllerError, controller_named
-from limo_hog.follow.sense.detectors import detector_named
 from limo_hog.follow.tracks.asking import Whom
 from limo_hog.live.controls import apply
 from limo_hog.live.pace import Pace
+from limo_hog.named_detectors import detector_named
 from limo_sim.run.episode import run_episode
 from limo_sim.run.log import Step
 from limo_sim.view.reading import followed_person

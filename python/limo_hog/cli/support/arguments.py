@@ -139,14 +139,13 @@ def add_target_and_detector(parser: ArgumentParser) -> None:
 
 def add_detector(parser: ArgumentParser) -> None:
     """Add --detector."""
-    from limo_hog.follow.sense.detectors import NAMES
+    from limo_hog.named_detectors import NAMES
 
     parser.add_argument(
         "--detector",
-        default="hog",
         metavar="|".join(NAMES),
-        help="the people detector: ours, ours on the half image, ours with another model, OpenCV's, or a network "
-        "(%(default)s)",
+        help="the people detector: ours, OpenCV's HOG by us, on the half image, with another model, by OpenCV, or a "
+        "network (limo for tracking, hog for others)",
     )
 
 

@@ -34,3 +34,8 @@ def controller_named(name: str, target_distance: float | None = None, person: Wh
         raise ControllerError(f"no controller {name!r}: want one of {', '.join(CONTROLLERS)}")
     controller = ProxemicController() if name == "proxemic" else TrackingController(person=person)
     return controller if target_distance is None else replace(controller, target_distance=target_distance)
+
+
+def detector_of(controller: str) -> str:
+    """Return which detector a controller is used with where none is asked for: the workshop's with OpenCV's HOG."""
+    return "limo" if controller == "tracking" else "hog"

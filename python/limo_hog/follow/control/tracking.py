@@ -18,9 +18,9 @@ from limo_hog.follow.decision import Belief, Decision, Mode
 from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import LIMO, RobotGeometry, Twist
 from limo_hog.follow.sense.clearance import NO_POINTS, DepthGrid, from_odometry, scan_points, to_odometry
-from limo_hog.follow.sense.detectors import Region
 from limo_hog.follow.sense.measurement import PERSON_RADIUS, RegionSize
 from limo_hog.follow.sense.observation import Observation, pose_at
+from limo_hog.follow.sense.region import Region
 from limo_hog.follow.space.grid import Grid
 from limo_hog.follow.tracks.asking import Whom, named
 from limo_hog.follow.tracks.hiding import Hiding
@@ -38,6 +38,7 @@ class TrackingController:
     whole_image_every: int = param(15, "frames", "One in this many frames is searched whole, else a region.", 1, 1000)
     slowest: float = param(0.3, "m/s", "People slower than this stand: the lidar shows them where they are.", 0, 2)
     near_behind: float = param(1.2, "m", "Behind the robot, what the map shows this near counts as well.", 0, 5)
+    mapped: float = param(3.5, "m", "Up to this far the depth image is entered into the map.", 0, 8)
     following: Following = field(default_factory=Following)  #: Where to be while the person is known to be somewhere.
     lookout: Lookout = field(default_factory=Lookout)  #: Where to look for a lost person.
     planner: Planner = field(default_factory=Planner)  #: Which command to send.
@@ -120,7 +121,7 @@ class TrackingController:
         people = np.array(known).reshape(-1, 2)
         depth_points = NO_POINTS
         if observation.depth is not None:
-            near = self.depth_grid.points(observation.depth, observation.focal_px, self.lookout.view, self.robot)
+            near = self.depth_grid.points(observation.depth, observation.focal_px, self.mapped, self.robot)
             depth_points = to_odometry(near, pose_at(tracks.poses, observation.stamp))
         ground = self.grid.update(state.ground, scan, pose, people, depth_points, self.robot)
         return replace(state, tracks=tracks, ground=ground)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import RobotGeometry
-from limo_hog.follow.sense.detectors import Region
 from limo_hog.follow.sense.observation import Clothes, Observation
+from limo_hog.follow.sense.region import Region
 
 #: What is nearer than this to a person's axis is the person's own [m]. Chosen: legs in mid-stride and an arm.
 PERSON_RADIUS = 0.45

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from limo_hog.detections import Detections
 from limo_hog.follow.parameters import param
-from limo_hog.follow.sense.detectors import Region
+from limo_hog.follow.sense.region import Region
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

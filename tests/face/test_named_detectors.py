@@ -1,4 +1,4 @@
-"""HOG, OpenCV's HOG and a network stand behind one protocol, on whole images and on parts of them."""
+"""HOG, OpenCV's HOG and a network stand behind one protocol and a name each."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -6,19 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.follow.sense.onnx_file import dark_cells
+from tests.face.onnx_file import dark_cells
 
 from limo_hog.detections import Detections
 from limo_hog.detector import PeopleDetector
-from limo_hog.follow.sense.detectors import (
-    Cv2Detector,
-    DetectorError,
-    HalfSize,
-    Region,
-    by_score,
-    detect_in,
-    detector_named,
-)
+from limo_hog.named_detectors import Cv2Detector, DetectorError, HalfSize, by_score, detector_named
 from limo_sim.run.arena import Arena
 from limo_sim.world.scenario import Scenario
 
@@ -36,39 +28,6 @@ class Spy:
 def frame() -> NDArray[np.uint8]:
     """Somebody 3 m ahead."""
     return Arena(Scenario.load("standing"), 0).frame().image
-
-
-@pytest.mark.parametrize(
-    ("region", "shown", "box"),
-    [
-        (Region(96, 32, 208, 192, 150.0), (192, 208, 3), [106, 52, 64, 128]),
-        # Large people are searched in a smaller picture.
-        (Region(0, 0, 400, 400, 320.0), (200, 200, 3), [20, 40, 128, 256]),
-    ],
-)
-def test_a_region_is_searched_alone(region: Region, shown: tuple[int, ...], box: list[int]) -> None:
-    spy = Spy()
-    assert detect_in(spy, np.zeros((480, 640, 3), np.uint8), region).windows.tolist() == [box]
-    assert [one.shape for one in spy.shown] == [shown]
-
-
-def test_a_part_keeps_the_models_person_box_and_calibration() -> None:
-    limo = PeopleDetector(model="limo", min_height=None)
-    image = np.zeros((480, 640, 3), np.uint8)
-    whole = limo.detect(image)
-    for height in (150.0, 320.0):
-        part = detect_in(limo, image, Region(0, 0, 400, 400, height))
-        assert (part.person_box, part.calibration) == (whole.person_box, whole.calibration)
-        assert part.calibration is not None
-
-
-def test_a_region_around_a_person_finds_what_the_whole_image_does(frame: NDArray[np.uint8]) -> None:
-    detector = detector_named("hog")
-    whole = detector.detect(frame).windows[0]
-    x, y, w, h = (int(value) for value in whole)
-    region = Region(x - 48, max(y - 32, 0), w + 96, h + 64, float(h))
-    part = detect_in(detector, frame, region).windows[0]
-    assert np.abs(part - whole).max() <= 16
 
 
 def test_half_size_is_the_mean_of_four_pixels_with_boxes_of_the_whole_image() -> None:
@@ -101,7 +60,7 @@ def test_what_is_no_network_or_no_detector_is_refused_by_name(tmp_path: Path) ->
     for name, told in (
         (f"onnx:{tmp_path / 'broken.onnx'}", "cannot read this as an ONNX network"),
         ("onnx:absent.onnx", "no such file"),
-        ("yolo", "want one of hog, hog-half, hog:MODEL, cv2, onnx:FILE"),
+        ("yolo", "want one of limo, hog, hog-half, hog:MODEL, cv2, onnx:FILE"),
     ):
         with pytest.raises(DetectorError, match=told):
             detector_named(name)
@@ -118,3 +77,10 @@ def test_our_hog_and_opencvs_find_one_box_for_a_person_by_each_way_to_suppress(f
     ours, theirs = detector_named("hog").detect(frame), Cv2Detector().detect(frame)
     assert len(ours) == 1
     assert ours.windows.tolist() == theirs.windows.tolist()
+
+
+def test_limo_finds_what_its_model_finds_and_more_with_scores_from_its_threshold_on(frame: NDArray[np.uint8]) -> None:
+    model, named = PeopleDetector(min_height=None, threshold=-1.2).detect(frame), detector_named("limo").detect(frame)
+    assert named.windows.tolist() == model.windows.tolist()
+    assert named.scores == pytest.approx(model.scores + 1.2)
+    assert (named.scores >= 0).all()

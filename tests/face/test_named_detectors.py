@@ -1,42 +1,23 @@
 """HOG, OpenCV's HOG and a network stand behind one protocol and a name each."""
 
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from tests.face.onnx_file import dark_cells
+from tests.somebody import OneBox, somebody_ahead
 
-from limo_hog.detections import Detections
 from limo_hog.detector import PeopleDetector
 from limo_hog.named_detectors import Cv2Detector, DetectorError, HalfSize, by_score, detector_named
-from limo_sim.run.arena import Arena
-from limo_sim.world.scenario import Scenario
-
-
-@dataclass
-class Spy:
-    shown: list[NDArray[np.uint8]] = field(default_factory=list)
-
-    def detect(self, image: NDArray[np.uint8]) -> Detections:
-        self.shown.append(image)
-        return Detections(np.array([[10, 20, 64, 128]], np.int32), np.array([1.0]))
-
-
-@pytest.fixture(scope="module")
-def frame() -> NDArray[np.uint8]:
-    """Somebody 3 m ahead."""
-    return Arena(Scenario.load("standing"), 0).frame().image
 
 
 def test_half_size_is_the_mean_of_four_pixels_with_boxes_of_the_whole_image() -> None:
-    spy = Spy()
-    found = HalfSize(spy).detect(np.zeros((481, 641, 3), np.uint8))
+    detector = OneBox()
+    found = HalfSize(detector).detect(np.zeros((481, 641, 3), np.uint8))
     assert found.windows.tolist() == [[20, 40, 128, 256]]
-    HalfSize(spy).detect(np.arange(4, dtype=np.uint8).reshape(2, 2, 1).repeat(3, axis=2))
-    assert [one.shape for one in spy.shown] == [(240, 320, 3), (1, 1, 3)]
-    assert spy.shown[1].tolist() == [[[2, 2, 2]]]
+    HalfSize(detector).detect(np.arange(4, dtype=np.uint8).reshape(2, 2, 1).repeat(3, axis=2))
+    assert [image.shape for image in detector.images] == [(240, 320, 3), (1, 1, 3)]
+    assert detector.images[1].tolist() == [[[2, 2, 2]]]
 
 
 def test_the_surest_comes_first() -> None:
@@ -66,7 +47,8 @@ def test_what_is_no_network_or_no_detector_is_refused_by_name(tmp_path: Path) ->
             detector_named(name)
 
 
-def test_our_hog_and_opencvs_find_one_box_for_a_person_by_each_way_to_suppress(frame: NDArray[np.uint8]) -> None:
+def test_our_hog_and_opencvs_find_one_box_for_a_person_by_each_way_to_suppress() -> None:
+    frame = somebody_ahead()
     every_hit = PeopleDetector(model="opencv", min_height=None, nms="group", group_threshold=0).detect(frame)
     assert len(every_hit) > 5
     for name in ("hog", "hog:opencv"):

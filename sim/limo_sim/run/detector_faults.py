@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.detections import Detections, Detector
-from limo_hog.follow.sense.region import Region, detect_in, is_halved
+from limo_hog.follow.sense.region import Region, detect_in
 from limo_sim.run.matching import NO_PERSON, person_of
 from limo_sim.sensing.camera import HEIGHT, WIDTH
 from limo_sim.world.scenario import DetectorFaults, Scenario
@@ -156,7 +156,7 @@ class FaultySearch:
             inside = (boxes[:, 0] >= region.x) & (boxes[:, 1] >= region.y)
             inside &= (ends[:, 0] <= region.x + region.width) & (ends[:, 1] <= region.y + region.height)
             boxes, scores = boxes[inside], scores[inside]
-            if is_halved(region):
+            if region.is_halved:
                 # Boxes of a half-size search have even sizes, and are an even number of pixels from its corner.
                 corner = np.array([region.x, region.y, 0, 0])
                 boxes = (boxes - corner) // 2 * 2 + corner

@@ -1,32 +1,12 @@
 """The part of an image where the person is expected is searched alone."""
 
-from dataclasses import dataclass, field
-
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from tests.somebody import OneBox, somebody_ahead
 
-from limo_hog.detections import Detections
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow.sense.region import Region, detect_in
 from limo_hog.named_detectors import detector_named
-from limo_sim.run.arena import Arena
-from limo_sim.world.scenario import Scenario
-
-
-@dataclass
-class Spy:
-    shown: list[NDArray[np.uint8]] = field(default_factory=list)
-
-    def detect(self, image: NDArray[np.uint8]) -> Detections:
-        self.shown.append(image)
-        return Detections(np.array([[10, 20, 64, 128]], np.int32), np.array([1.0]))
-
-
-@pytest.fixture(scope="module")
-def frame() -> NDArray[np.uint8]:
-    """Somebody 3 m ahead."""
-    return Arena(Scenario.load("standing"), 0).frame().image
 
 
 @pytest.mark.parametrize(
@@ -38,9 +18,9 @@ def frame() -> NDArray[np.uint8]:
     ],
 )
 def test_a_region_is_searched_alone(region: Region, shown: tuple[int, ...], box: list[int]) -> None:
-    spy = Spy()
-    assert detect_in(spy, np.zeros((480, 640, 3), np.uint8), region).windows.tolist() == [box]
-    assert [one.shape for one in spy.shown] == [shown]
+    detector = OneBox()
+    assert detect_in(detector, np.zeros((480, 640, 3), np.uint8), region).windows.tolist() == [box]
+    assert [image.shape for image in detector.images] == [shown]
 
 
 def test_a_part_keeps_the_models_person_box_and_calibration() -> None:
@@ -53,8 +33,8 @@ def test_a_part_keeps_the_models_person_box_and_calibration() -> None:
         assert part.calibration is not None
 
 
-def test_a_region_around_a_person_finds_what_the_whole_image_does(frame: NDArray[np.uint8]) -> None:
-    detector = detector_named("hog")
+def test_a_region_around_a_person_finds_what_the_whole_image_does() -> None:
+    detector, frame = detector_named("hog"), somebody_ahead()
     whole = detector.detect(frame).windows[0]
     x, y, w, h = (int(value) for value in whole)
     region = Region(x - 48, max(y - 32, 0), w + 96, h + 64, float(h))

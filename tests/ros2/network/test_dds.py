@@ -20,14 +20,13 @@ from cyclonedds.topic import Topic
 from pytest import MonkeyPatch
 from tests.answers import AnswerTo
 from tests.ros2.network.publishing import publishing, until_it_comes
+from tests.somebody import somebody_ahead
 
 from limo_hog.cli.topic import as_yaml
 from limo_hog.follow.robot import LIMO, RobotGeometry, Twist
 from limo_hog.follow.sense.observation import Scan
 from limo_hog.ros2 import dds, follower, frames, messages, names
 from limo_sim.ros.live import second_publishers
-from limo_sim.run.arena import Arena
-from limo_sim.world.scenario import Scenario
 
 SCAN = messages.laser_scan(Scan(1.0, np.ones(292, np.float32), -2.0, 2.0, 0.12, 8.0))
 BLACK = messages.image(1.0, np.zeros((8, 8, 3), np.uint8))
@@ -205,7 +204,7 @@ def test_an_arena_names_the_topics_that_another_publishes() -> None:
 
 @pytest.mark.parametrize("kind", ["compressed", "mono8", "rgb8"])
 def test_the_follower_reads_whatever_pictures_the_camera_sends(kind: str, answer_to: AnswerTo) -> None:
-    image = Arena(Scenario.load("standing"), 0).frame().image
+    image = somebody_ahead()
     topic, message = names.IMAGE_COMPRESSED, messages.compressed_image(1.0, image)
     if kind != "compressed":
         topic, message = names.IMAGE, messages.image(1.0, image[..., ::-1] if kind == "rgb8" else image[..., 1])

@@ -9,6 +9,10 @@ import numpy as np
 from limo_hog.detections import Detections, Detector
 from limo_hog.named_detectors import HalfSize, Image
 
+#: A region whose expected window is at least this high is searched at half size [px]. Chosen above twice HOG's 128, so
+#: that a person may be 9 % lower than expected.
+_HALVED_FROM = 280.0
+
 
 @dataclass(frozen=True, slots=True)
 class Region:
@@ -26,15 +30,10 @@ class Region:
         margin = self.window_height / 4
         return self.x + margin <= column <= self.x + self.width - margin
 
-
-#: A region whose expected window is at least this high is searched at half size [px]. Chosen above twice HOG's 128, so
-#: that a person may be 9 % lower than expected.
-_HALVED_FROM = 280.0
-
-
-def is_halved(region: Region) -> bool:
-    """Whether `detect_in` searches a region at half size: its finest levels cost most and hold only smaller people."""
-    return region.window_height >= _HALVED_FROM
+    @property
+    def is_halved(self) -> bool:
+        """Whether it is searched at half size: its finest levels cost most and hold only smaller people."""
+        return self.window_height >= _HALVED_FROM
 
 
 def detect_in(detector: Detector, image: Image, region: Region | None) -> Detections:
@@ -42,7 +41,7 @@ def detect_in(detector: Detector, image: Image, region: Region | None) -> Detect
     if region is None:
         return detector.detect(image)
     rows, columns = slice(region.y, region.y + region.height), slice(region.x, region.x + region.width)
-    if is_halved(region):
+    if region.is_halved:
         detector = HalfSize(detector)
     found = detector.detect(np.ascontiguousarray(image[rows, columns]))
     return replace(found, windows=found.windows + np.array([region.x, region.y, 0, 0], np.int32))

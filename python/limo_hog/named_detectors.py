@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog import _core
 from limo_hog.atomic import is_utf8
 from limo_hog.detections import Detections, Detector
 from limo_hog.exceptions import LimoHogError
@@ -51,7 +52,7 @@ def detector_named(name: str) -> Detector:
     if name == "hog":
         return hog
     if name == "hog-half":
-        return HalfSize(hog)
+        return AtScale(hog, 0.5)
     raise DetectorError(f"no detector {name!r}: want one of {', '.join(NAMES)}")
 
 
@@ -62,18 +63,22 @@ def by_score(boxes: NDArray[Any], scores: NDArray[Any], person_box: PersonBox = 
 
 
 @dataclass(frozen=True)
-class HalfSize:
-    """The workshop's speed tip: search the image at half its size. Blind to people lower than 200 px."""
+class AtScale:
+    """Search the image at `scale` times its size, a half or a whole number.
+
+    0.5 is the workshop's speed tip, blind to people lower than 200 px. 2 finds people half as high as 1 does, for four
+    times the work.
+    """
 
     detector: Detector
+    scale: float
 
     def detect(self, image: Image) -> Detections:
-        """Find people in every second pixel, each the mean of four; windows are in the whole image."""
-        height, width = image.shape[0] // 2 * 2, image.shape[1] // 2 * 2
-        rows = image[0:height:2].astype(np.uint16) + image[1:height:2]
-        half = ((rows[:, 0:width:2] + rows[:, 1:width:2] + 2) >> 2).astype(np.uint8)
-        found = self.detector.detect(half)
-        return replace(found, windows=found.windows * 2)
+        """Find people, best first; windows are in the image as it is. At half its size an odd row or column is left."""
+        height, width = (int(self.scale * side) for side in image.shape[:2])
+        whole = np.ascontiguousarray(image[: round(height / self.scale), : round(width / self.scale)])
+        found = self.detector.detect(_core.resize(whole, width, height))
+        return replace(found, windows=(found.windows / self.scale).astype(np.int32))
 
 
 @dataclass(frozen=True)

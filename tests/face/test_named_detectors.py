@@ -2,22 +2,30 @@
 
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from tests.face.onnx_file import dark_cells
 from tests.somebody import OneBox, somebody_ahead
 
 from limo_hog.detector import PeopleDetector
-from limo_hog.named_detectors import Cv2Detector, DetectorError, HalfSize, by_score, detector_named
+from limo_hog.named_detectors import AtScale, Cv2Detector, DetectorError, by_score, detector_named
 
 
 def test_half_size_is_the_mean_of_four_pixels_with_boxes_of_the_whole_image() -> None:
     detector = OneBox()
-    found = HalfSize(detector).detect(np.zeros((481, 641, 3), np.uint8))
+    found = AtScale(detector, 0.5).detect(np.zeros((481, 641, 3), np.uint8))
     assert found.windows.tolist() == [[20, 40, 128, 256]]
-    HalfSize(detector).detect(np.arange(4, dtype=np.uint8).reshape(2, 2, 1).repeat(3, axis=2))
+    AtScale(detector, 0.5).detect(np.arange(4, dtype=np.uint8).reshape(2, 2, 1).repeat(3, axis=2))
     assert [image.shape for image in detector.images] == [(240, 320, 3), (1, 1, 3)]
     assert detector.images[1].tolist() == [[[2, 2, 2]]]
+
+
+def test_an_image_at_twice_its_size_is_opencvs_with_boxes_of_the_image_as_it_is() -> None:
+    detector, image = OneBox(), np.random.default_rng(1).integers(0, 256, (31, 21, 3), np.uint8)
+    assert AtScale(detector, 2.0).detect(image).windows.tolist() == [[5, 10, 32, 64]]
+    enlarged = cv2.resize(image, (42, 62), interpolation=cv2.INTER_LINEAR_EXACT)
+    np.testing.assert_array_equal(detector.images[0], enlarged)
 
 
 def test_the_surest_comes_first() -> None:

@@ -156,7 +156,7 @@ class FaultySearch:
             inside = (boxes[:, 0] >= region.x) & (boxes[:, 1] >= region.y)
             inside &= (ends[:, 0] <= region.x + region.width) & (ends[:, 1] <= region.y + region.height)
             boxes, scores = boxes[inside], scores[inside]
-            if region.is_halved:
+            if region.scale < 1.0:
                 # Boxes of a half-size search have even sizes, and are an even number of pixels from its corner.
                 corner = np.array([region.x, region.y, 0, 0])
                 boxes = (boxes - corner) // 2 * 2 + corner

@@ -46,9 +46,9 @@ def hunt_for(points: Points, planned: float) -> Hunt:
 
 def test_no_person_is_where_the_camera_shows_none() -> None:
     sure = Lookout(wandering=Wandering(found=1.0))
-    around = np.array([(r * np.cos(a), r * np.sin(a)) for r in (1.0, 3.3, 3.7, 4.5) for a in np.arange(-3, 3.1, 0.3)])
+    around = np.array([(r * np.cos(a), r * np.sin(a)) for r in (1.0, 3.3, 5.8, 6.2) for a in np.arange(-3, 3.1, 0.3)])
     after = sure.step(hunt_for(around, NOW), BLIND, situated(free_ground()))
-    shown = (np.abs(np.arctan2(around[:, 1], around[:, 0])) < 0.5) & (np.hypot(*around.T) < 3.5)
+    shown = (np.abs(np.arctan2(around[:, 1], around[:, 0])) < 0.5) & (np.hypot(*around.T) < 6.0)
     assert shown.any()
     np.testing.assert_array_equal(np.unique(after.places.points, axis=0), np.unique(around[~shown], axis=0))
 
@@ -75,7 +75,7 @@ def test_as_many_places_are_compared_however_large_the_room_and_many_the_guesses
 def test_a_place_that_is_driven_to_is_kept_until_another_is_half_as_good_again() -> None:
     lookout = Lookout(candidates=10_000)
     for more, kept in ((1.3, True), (2.0, False)):
-        few, many = np.full((24, 2), (0.0, 4.5)), np.full((round(24 * more), 2), (0.0, -4.5))
+        few, many = np.full((24, 2), (0.0, 7.0)), np.full((round(24 * more), 2), (0.0, -7.0))
         hunt = hunt_for(np.concatenate([few, many]), -np.inf)
         fresh = lookout.step(hunt, BLIND, situated(free_ground()))
         assert fresh.way[-1, 1] < 0
@@ -136,8 +136,20 @@ def test_a_place_is_worth_driving_to_that_shows_a_twentieth_of_the_places() -> N
         assert (hunt.facing is not None, len(hunt.way)) == (worth, 0)
 
 
-def test_from_further_than_three_and_a_half_metres_a_person_is_not_seen() -> None:
-    for far, in_place in ((3.4, True), (3.6, False)):
+def test_of_places_to_either_side_those_are_faced_that_the_camera_shows_at_once() -> None:
+    # Their middle, straight ahead, shows nothing.
+    for left, right, side in ((6, 4, 1), (4, 6, -1)):
+        hunt = planned([(1.0, 3.0)] * left + [(1.0, -3.0)] * right)
+        assert len(hunt.way) == 0
+        assert hunt.facing == pytest.approx((1.0, side * 3.0))
+
+
+def test_of_as_many_places_the_nearer_to_turn_to_are_faced() -> None:
+    assert planned([(2.0, 2.0)] * 5 + [(-2.0, -0.5)] * 5).facing == pytest.approx((2.0, 2.0))
+
+
+def test_from_further_than_six_metres_a_person_is_not_seen() -> None:
+    for far, in_place in ((5.9, True), (6.1, False)):
         hunt = planned([(far, 0.1)] * 10)
         assert (len(hunt.way) == 0) == in_place
         assert hunt.facing == pytest.approx((far, 0.1))
@@ -147,7 +159,7 @@ def test_a_second_and_a_half_of_looking_is_worth_as_much_as_driving_that_long() 
     # From here a part of the places is seen at once, from about 1.5 m further on all of them: .6 m/s take 2.5 s more.
     for here, stays in ((0.5, True), (0.2, False)):
         near, far = round(50 * here), 50 - round(50 * here)
-        hunt = planned([(3.0, 0.0)] * near + [(5.0, 0.0)] * far, Lookout(candidates=10_000))
+        hunt = planned([(5.5, 0.0)] * near + [(7.5, 0.0)] * far, Lookout(candidates=10_000))
         assert (len(hunt.way) == 0) == stays
 
 

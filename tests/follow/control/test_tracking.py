@@ -56,6 +56,24 @@ def test_a_person_gone_is_lost_and_searched_for_the_way_they_went(side: float) -
     assert decision.twist == Twist(0.0, side * CONTROLLER.lookout.search_rate)
 
 
+def test_a_far_person_is_looked_for_enlarged_though_missed_and_a_near_one_in_the_whole_image() -> None:
+    for distance, is_far in ((6.0, True), (2.5, False)):
+        world = World(person=(distance, 0.0), velocity=(0.8, 0.0) if is_far else (0.0, 0.0))
+        seen = run(world, 1.0)
+        assert (there(seen.region).scale == 2.0) == is_far
+        missed = run(world, 0.1, seen.state, visible=False)
+        assert (missed.region is not None) == is_far
+
+
+def test_a_lost_person_is_looked_for_in_the_whole_image_enlarged_and_the_first_as_it_is() -> None:
+    assert run(World(), 0.1, visible=False).region is None
+    world = World(person=(3.0, -1.0), velocity=(0.0, -0.4), lidar=False)
+    lost = run(world, 4.0, run(world, 4.0).state, visible=False)
+    assert lost.mode is Mode.LOST
+    region = there(lost.region)
+    assert (region.x, region.y, region.width, region.height, region.scale) == (0, 0, 640, 480, 2.0)
+
+
 def test_legs_in_the_scan_keep_a_person_too_near_for_the_camera() -> None:
     world = World(person=(1.6, 0.0))
     state = run(world, 4.0).state

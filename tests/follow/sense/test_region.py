@@ -15,6 +15,8 @@ from limo_hog.named_detectors import detector_named
         (Region(96, 32, 208, 192, 150.0), (192, 208, 3), [106, 52, 64, 128]),
         # Large people are searched in a smaller picture.
         (Region(0, 0, 400, 400, 320.0), (200, 200, 3), [20, 40, 128, 256]),
+        # And small ones, who are far away, in a larger one.
+        (Region(96, 32, 208, 192, 100.0), (384, 416, 3), [101, 42, 32, 64]),
     ],
 )
 def test_a_region_is_searched_alone(region: Region, shown: tuple[int, ...], box: list[int]) -> None:

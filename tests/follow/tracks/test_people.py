@@ -103,6 +103,10 @@ def test_a_person_is_expected_to_be_found_where_the_search_shows_all_of_them() -
     assert expected(1.65, confirmed=False)
     left = Region(0, 0, 320, 480, 200.0)
     assert [expected(2.5, bearing, region=left) for bearing in (0.3, -0.1)] == [True, False]
+    # Far away they are where the search enlarges, and not those who are higher than the part that is searched.
+    far = Region(0, 140, 640, 200, 100.0)
+    assert [expected(distance) for distance in (4.0, 5.0)] == [True, False]
+    assert [expected(distance, region=far) for distance in (2.5, 5.0, 8.0, 9.0)] == [False, True, True, False]
     # Behind something they are not found.
     assert [expected(3.0, depth=flat(there)) for there in (2.6, 2.4)] == [True, False]
 

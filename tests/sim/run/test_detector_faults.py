@@ -14,7 +14,7 @@ from tests.sim.logs import Finds, figures
 from limo_hog.detections import Detections, Detector
 from limo_hog.follow import ApproachController, TrackingController
 from limo_hog.follow.sense.region import Region
-from limo_hog.named_detectors import HalfSize, detector_named
+from limo_hog.named_detectors import AtScale, detector_named
 from limo_sim.env import LimoFollowV1
 from limo_sim.ros.live import run_live
 from limo_sim.ros.runner import run_node
@@ -147,7 +147,7 @@ def test_in_a_part_of_the_image_the_false_boxes_are_those_that_lie_within_it(hal
     # One window in eighty is drawn as high as the image or higher.
     assert from_the_top > 0
     # A search at half size keeps its own boxes.
-    halves = Faulty(HalfSize(Finds(*WINDOWS)), DetectorFaults(false_rate=0.001))
+    halves = Faulty(AtScale(Finds(*WINDOWS), 0.5), DetectorFaults(false_rate=0.001))
     np.testing.assert_array_equal(halves.at(truth(0)).windows[:2], WINDOWS * 2)
 
 

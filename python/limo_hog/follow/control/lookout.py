@@ -41,11 +41,13 @@ class Lookout:
     arrived: float = param(0.2, "m", "A way ends this near to its last point.")
     replan_s: float = param(0.8, "s", "A way is chosen anew after this time.")
     candidates: int = param(40, "1", "Places to look from that are compared.")
-    view: float = param(3.5, "m", "From so far away a person is seen.")
+    directions: int = param(24, "1", "Directions to look in that are compared at each.")
+    view: float = param(6.0, "m", "From so far away a person is seen.")
     half_view: float = param(0.5, "rad", "So far to either side of straight ahead the camera shows a whole person.")
     same_goal: float = param(0.5, "m", "Places within this of the one driven to are worth more.")
     stay: float = param(1.5, "1", "So many times as much.")
     settle_s: float = param(1.5, "s", "Time that looking from a place takes, however near it is.")
+    turn_rate: float = param(1.0, "rad/s", "Mean turn rate on the way there and at its end.", 0.1, 3)
     least: float = param(0.05, "1", "A place that shows less of where the person may be is not driven to.")
     give_up_s: float = param(60.0, "s", "Then looking round ends, and the robot turns in place.", 0, 3600)
     wandering: Wandering = field(default_factory=Wandering)
@@ -106,18 +108,23 @@ class Lookout:
         origins = np.concatenate([[[pose.x, pose.y]], grid.middle_of(ground, cells)])
         far = np.concatenate([[0.0], routes[cells[:, 0], cells[:, 1]]])
         points = hunt.places.points[:: max(len(hunt.places.points) // 50, 1)]
-        near = np.hypot(*(origins[:, None] - points[None, :]).transpose(2, 0, 1)) < self.view
-        shown = near & grid.sees(ground, origins, points)
-        share = shown.mean(axis=1)
-        worth = share / (self.settle_s + far / self.speed)
+        dx, dy = (points[None, :] - origins[:, None]).transpose(2, 0, 1)
+        seen = (np.hypot(dx, dy) < self.view) & grid.sees(ground, origins, points)
+        faced = np.linspace(-math.pi, math.pi, self.directions, endpoint=False)
+        shown = seen[:, None] & (_turn(np.arctan2(dy, dx)[:, None], faced[:, None]) < self.half_view)
+        share = shown.mean(axis=2)
+        courses = np.arctan2(origins[:, 1] - pose.y, origins[:, 0] - pose.x)
+        courses[0] = pose.yaw
+        turns = _turn(courses, pose.yaw)[:, None] + _turn(courses[:, None], faced)
+        worth = share / (self.settle_s + far[:, None] / self.speed + turns / self.turn_rate)
         if len(hunt.way):
             # Two places of about the same worth would be driven to in turns.
             goal = np.hypot(*(origins - hunt.way[-1]).T)
-            worth[(goal < self.same_goal) & (share >= self.least)] *= self.stay
-        best = int(np.argmax(worth))
-        if share[best] < self.least:
+            worth[(goal < self.same_goal)[:, None] & (share >= self.least)] *= self.stay
+        best, side = divmod(int(np.argmax(worth)), self.directions)
+        if share[best, side] < self.least:
             return replace(hunt, way=NO_POINTS, facing=None, planned=now)
-        middle = points[shown[best]].mean(axis=0)
+        middle = points[shown[best, side]].mean(axis=0)
         facing = float(middle[0]), float(middle[1])
         way = NO_POINTS if best == 0 else self.router.way(grid, ground, routes, tuple(cells[best - 1]))
         return replace(hunt, way=way, facing=facing, planned=now)
@@ -134,3 +141,9 @@ class Lookout:
         count, random = self.wandering.count, np.random.default_rng([hunt.places.seed, 3])
         chosen = points[random.integers(len(points), size=count)]
         return Places(now, chosen, np.zeros((count, 2)), hunt.places.seed + 1)
+
+
+def _turn(some: Points, others: Points | float) -> Points:
+    """Return how far it is to turn from some directions to others [rad], 0 … pi."""
+    off = some - others
+    return np.asarray(np.abs(off - math.tau * np.rint(off / math.tau)))

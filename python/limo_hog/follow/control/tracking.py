@@ -20,7 +20,7 @@ from limo_hog.follow.robot import LIMO, RobotGeometry, Twist
 from limo_hog.follow.sense.clearance import NO_POINTS, DepthGrid, from_odometry, scan_points, to_odometry
 from limo_hog.follow.sense.measurement import PERSON_RADIUS, RegionSize
 from limo_hog.follow.sense.observation import Observation, pose_at
-from limo_hog.follow.sense.region import Region
+from limo_hog.follow.sense.region import FAR_WINDOW, Region
 from limo_hog.follow.space.grid import Grid
 from limo_hog.follow.tracks.asking import Whom, named
 from limo_hog.follow.tracks.hiding import Hiding
@@ -38,6 +38,7 @@ class TrackingController:
     whole_image_every: int = param(15, "frames", "One in this many frames is searched whole, else a region.", 1, 1000)
     slowest: float = param(0.3, "m/s", "People slower than this stand: the lidar shows them where they are.", 0, 2)
     near_behind: float = param(1.2, "m", "Behind the robot, what the map shows this near counts as well.", 0, 5)
+    mapped: float = param(3.5, "m", "Up to this far the depth image is entered into the map.", 0, 8)
     following: Following = field(default_factory=Following)  #: Where to be while the person is known to be somewhere.
     lookout: Lookout = field(default_factory=Lookout)  #: Where to look for a lost person.
     planner: Planner = field(default_factory=Planner)  #: Which command to send.
@@ -84,9 +85,8 @@ class TrackingController:
             mode, reason = mode if mode in (Mode.LOST, Mode.SEARCH) else moves, plan.reason
         if observation.odometry is not None:
             twist = self.wheels.within_reach(twist, situation.driven, state.acceleration, situation.period, self.robot)
-        in_view = person is not None and person.seen == observation.stamp and belief.followed is not None
         target = dict(tracks.boxes).get(person.number) if person and belief.followed is not None else None
-        region = self._region(person, state, observation) if person and in_view else None
+        region = self._region(person if belief.followed is not None else None, state, observation)
         since_full = 0 if region is None else state.since_full + 1
         state = replace(state, kept=plan.manoeuvre, sent=twist, since_full=since_full)
         if (asked := choice.asked) is not None:
@@ -120,7 +120,7 @@ class TrackingController:
         people = np.array(known).reshape(-1, 2)
         depth_points = NO_POINTS
         if observation.depth is not None:
-            near = self.depth_grid.points(observation.depth, observation.focal_px, self.lookout.view, self.robot)
+            near = self.depth_grid.points(observation.depth, observation.focal_px, self.mapped, self.robot)
             depth_points = to_odometry(near, pose_at(tracks.poses, observation.stamp))
         ground = self.grid.update(state.ground, scan, pose, people, depth_points, self.robot)
         return replace(state, tracks=tracks, ground=ground)
@@ -267,14 +267,26 @@ class TrackingController:
         likeness = state.choice.likeness
         return likeness is None or likeness.of(person.number) >= self.selection.identity.sure
 
-    def _region(self, person: Person, state: TrackingState, observation: Observation) -> Region | None:
-        """Return where the person should be in the next frame; None to search all of it."""
+    def _region(self, person: Person | None, state: TrackingState, observation: Observation) -> Region | None:
+        """Return where the person followed should be in the next frame; None to search all of it as it is.
+
+        Who is lost is looked for in all of it, far away as well.
+        """
+        everything = Region(0, 0, observation.width, observation.height, FAR_WINDOW)
+        if person is None:
+            return None if state.choice.measured is None else everything
         if state.since_full + 1 >= self.whole_image_every or not self.selection.is_candidate(person):
             return None
-        if state.choice.asked is not None or not self._is_sure(person, state):
-            # The person asked for, or the right person, may be outside the region of the person followed.
+        if state.choice.asked is not None:
+            # The person asked for may be outside the region of the person followed.
             return None
         stamp = observation.stamp + state.tracks.period
         pose = pose_at(state.tracks.poses, stamp)
         bearing, distance = bearing_range(predict(person.track, stamp, self.tracker.noise), pose)
-        return self.region.around(bearing, distance, person.window, person.centre, observation)
+        region = self.region.around(bearing, distance, person.window, person.centre, observation)
+        is_far = region is not None and region.scale > 1.0
+        if not self._is_sure(person, state):
+            # The right person may be outside it.
+            return everything if is_far else None
+        # Who is near and was missed is looked for in all of the image, which would not show who is far.
+        return region if is_far or person.seen == observation.stamp else None

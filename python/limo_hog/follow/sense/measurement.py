@@ -194,14 +194,17 @@ class Visibility:
         `confirmed` person, and not of a track that has yet to prove itself.
         """
         height = window / max(distance, 0.3)
-        if abs(bearing) > self.widest or height < self.smallest_window:
+        part = observation.region
+        searched = part or Region(0, 0, observation.width, observation.height, height)
+        smallest = self.smallest_window / (part.scale if part else 1.0)
+        if abs(bearing) > self.widest or not smallest <= height <= searched.height:
             return False
         column = observation.width / 2 - observation.focal_px * math.tan(bearing)
         middle = observation.height / 2 + centre / max(distance, 0.3)
         cut_off = not self.shown * height <= middle <= observation.height - self.shown * height
         if confirmed and (cut_off or distance < self.near):
             return False
-        if not (observation.region or Region(0, 0, observation.width, observation.height, height)).holds(column):
+        if not searched.holds(column):
             return False
         if observation.depth is None:
             return True

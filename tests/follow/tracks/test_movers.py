@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.follow.estimates import upper
-from tests.follow.tracks.walkers import FREE, GRID, HALF_VIEW, MOVERS, NOISE, SCAN_S, legs, update, walk, walker
+from tests.follow.tracks.walkers import FREE, GRID, HALF_VIEW, MOVERS, NOISE, SCAN_S, legs, person, update, walk, walker
 
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.observation import Odometry
@@ -183,12 +183,37 @@ def test_nothing_moves_or_has_left_before_the_ground_is_mapped() -> None:
     assert (len(movers), MOVERS.moving(movers)) == (1, [])
 
 
-def test_returns_are_one_movers_and_those_of_a_persons_legs_first() -> None:
-    persons, nameless = walker(7, 2.0, 0.0), walker(None, 2.0, 0.2)
-    after = update((nameless, persons), 1.1, (2.0, 0.08), (2.0, 0.12))
-    assert {one.number: one.felt for one in after} == {7: 1.1, None: 1.0}
-    both = update((nameless, persons), 1.1, (2.0, -0.02), (2.0, 0.0), (2.0, 0.4), (2.0, 0.42))
-    assert {one.number: one.felt for one in both} == {7: 1.1, None: 1.1}
+def test_returns_are_one_movers_the_nearest_of_those_that_are_known_to_walk() -> None:
+    persons, nameless = walker(7, 2.0, 0.0), walker(None, 2.0, 0.3)
+    between = (2.0, 0.18), (2.0, 0.22)
+    assert felt((nameless, persons), *between) == {7: 1.0, None: 1.1}
+    assert felt((replace(nameless, left=False), persons), *between) == {7: 1.1, None: 1.0}
+    assert felt((nameless, persons), (2.0, -0.02), (2.0, 0.0), *between) == {7: 1.1, None: 1.1}
+
+
+def felt(movers: tuple[Mover, ...], *points: Place) -> dict[int | None, float]:
+    """Return when the legs of each number were felt last, after a scan at 1.1 s."""
+    return {mover.number: mover.felt for mover in update(movers, 1.1, *points)}
+
+
+@pytest.mark.parametrize(
+    ("movers", "taken"),
+    [
+        ((), True),
+        ((walker(7, 2.0, 0.0), walker(None, 2.0, 0.3)), False),
+        # Legs without a name may be the person's own, where these are not known; and what stands is nobody's.
+        ((walker(None, 2.0, 0.3),), True),
+        ((walker(7, 2.0, 0.0), replace(walker(None, 2.0, 0.3), left=False)), True),
+        ((walker(8, 2.0, 0.3),), False),
+        ((walker(8, 2.0, -0.3),), True),
+    ],
+)
+def test_who_walks_past_close_by_takes_nobodys_track_along(movers: tuple[Mover, ...], taken: bool) -> None:
+    followed = person(7, 2.0, 0.0, 0.9)
+    returns = Returns(1.0, np.array([(2.0, 0.18), (2.0, 0.22)]), Odometry())
+    after = MOVERS.walked(followed, movers, returns, NOISE)
+    assert (after.felt == 1.0) == taken
+    assert (after.track.mean[1] > 0.0) == taken
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ A group of returns as wide as two legs is followed from scan to scan. It counts 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from operator import attrgetter
 
@@ -17,12 +17,15 @@ from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import Points, lidar_at
 from limo_hog.follow.sense.measurement import STATURE, Measurement
-from limo_hog.follow.sense.observation import Odometry
+from limo_hog.follow.sense.observation import Mask, Odometry
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.association import Legs, Returns, all_distances, distances
 from limo_hog.follow.tracks.kalman import Noise, Track
 from limo_hog.follow.tracks.person import Person
+
+#: In which order movers take returns.
+_PERSON, _MOVED, _ANYTHING = range(3)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,15 +84,17 @@ class Movers:
         if ground is not None:
             points = points[~grid.is_near_blocked(ground, points, lasting=True)]
         kept: list[Mover] = []
-        people = [mover for mover in movers if mover.number is not None]
-        movers = (*people, *[mover for mover in movers if mover.number is None])
+        movers = tuple(sorted(movers, key=self._rank))
+        claims = sum(self._rank(mover) < _ANYTHING for mover in movers)
         expected = [kalman.predict(mover.track, returns.stamp, noise) for mover in movers]
         gaps = all_distances(points, expected)
         legs = {mover.stature: self.legs.of(mover.stature) for mover in movers}
         gaps = np.where(gaps < np.array([legs[mover.stature].radius for mover in movers])[:, None], gaps, np.inf)
-        whose, free, near = self._whose(movers, gaps), np.ones(len(points), bool), gaps < np.inf
+        # A return is theirs who are nearest, of those known to be somebody's legs or to move.
+        whose = gaps[:claims].argmin(axis=0) if claims else np.zeros(len(points), np.int64)
+        free, near = np.ones(len(points), bool), gaps < np.inf
         for index, mover in enumerate(movers):
-            own = free if mover.number is None else free & (whose == mover.number)
+            own = free & (whose == index) if index < claims else free
             track = legs[mover.stature].corrected(expected[index], points[own & near[index]], returns.pose, noise)
             if track is not None:
                 shown = mover.shown + is_in_view(track, returns, camera, self.robot)
@@ -114,8 +119,31 @@ class Movers:
 
     def moving(self, movers: tuple[Mover, ...], since: float = -math.inf) -> list[Mover]:
         """Return those that have moved, and were measured after `since` [s]."""
-        left = [mover for mover in movers if mover.left and mover.scans >= self.fewest_scans and mover.felt > since]
-        return [mover for mover in left if math.dist(mover.track.place, mover.began) > self.least_way]
+        return [mover for mover in movers if mover.felt > since and self._has_moved(mover)]
+
+    def walked(
+        self,
+        person: Person,
+        movers: tuple[Mover, ...],
+        returns: Returns,
+        noise: Noise,
+        is_ground: Callable[[Points], Mask] | None = None,
+    ) -> Person:
+        """Return a person brought up to a scan by returns at their legs; as they were where there are none.
+
+        What is nearer to the legs of another that walk is not theirs: who passes close by would take the track along.
+        Legs without a name are another's only where the person's own are known.
+        """
+        track, since = kalman.predict(person.track, returns.stamp, noise), returns.stamp - self.forget_s
+        is_felt = any(mover.number == person.number and mover.felt > since for mover in movers)
+        walking = [mover for mover in self.moving(movers, since) if mover.number != person.number]
+        others = [mover.track for mover in walking if is_felt or mover.number is not None]
+        if others:
+            others = [kalman.predict(other, returns.stamp, noise) for other in others]
+            nearest = all_distances(returns.points, others).min(axis=0)
+            returns = replace(returns, points=returns.points[distances(returns.points, track) <= nearest])
+        found = self.legs.of(person.stature).update(track, returns, noise, is_ground)
+        return person if found is None else replace(person, track=found, felt=returns.stamp)
 
     def felt(self, movers: tuple[Mover, ...], now: float) -> Points:
         """Return the places of what a scan has just shown, moving or not, float64 (N, 2) [m], odometry frame."""
@@ -181,13 +209,15 @@ class Movers:
         fit = kalman.innovation(track, math.atan2(dy, dx) - pose.yaw, distance, pose, noise)
         return replace(person, track=kalman.update(track, fit), felt=returns.stamp)
 
-    def _whose(self, movers: tuple[Mover, ...], gaps: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Return whose legs each of N returns may be, the nearest, 0 for none; in `gaps`, (M, N), known people lead."""
-        numbers = np.array([mover.number for mover in movers if mover.number is not None], np.int64)
-        if len(numbers) == 0:
-            return np.zeros(gaps.shape[1], np.int64)
-        gaps = gaps[: len(numbers)]
-        return np.where(gaps.min(axis=0) < np.inf, numbers.take(gaps.argmin(axis=0)), 0)
+    def _has_moved(self, mover: Mover) -> bool:
+        way = math.dist(mover.track.place, mover.began)
+        return mover.left and mover.scans >= self.fewest_scans and way > self.least_way
+
+    def _rank(self, mover: Mover) -> int:
+        """Return whose turn it is to take returns: a known person's legs, what has moved, and what may be anything."""
+        if mover.number is not None:
+            return _PERSON
+        return _MOVED if self._has_moved(mover) else _ANYTHING
 
     def _passed(self, returns: Returns, places: Points) -> NDArray[np.bool_]:
         """Return whether the beams nearest to each of (N, 2) places end behind it, bool (N,)."""

@@ -83,7 +83,7 @@ class Tracker:
         stamp, pose = observation.stamp, pose_at(tracks.poses, observation.stamp)
         known = [person for person in tracks.people if stamp - person.measured < self.forget_s]
         scans = tracks.scans if observation.between else ()
-        known = [predict(self._walked(person, scans, stamp), stamp, self.noise) for person in known]
+        known = [predict(self._walked(person, scans, tracks, stamp), stamp, self.noise) for person in known]
         measured = measure(observation, self.robot)
         flat = {which for which, seen in enumerate(measured) if not self.existence.is_solid(seen)}
         moving = self.movers.moving(tracks.movers, stamp - self.movers.forget_s)
@@ -199,19 +199,16 @@ class Tracker:
                 # Legs continue a track; after a gap, whatever stands there could be taken for them.
                 break
             if (unseen == 0 or returns.stamp > person.felt) and returns.stamp > now.track.stamp - self.scan_period_s:
-                legs = self.movers.legs.of(person.stature)
-                track = legs.update(now.track, returns, self.noise, is_ground)
-                now = now if track is None else replace(now, track=track, felt=returns.stamp)
+                now = self.movers.walked(now, tracks.movers, returns, self.noise, is_ground)
         kept = now if unseen > 0 else replace(person, felt=now.felt)
         people = [kept if other.number == person.number else other for other in tracks.people]
         return now, replace(tracks, people=tuple(people))
 
-    def _walked(self, person: Person, scans: tuple[Returns, ...], stamp: float) -> Person:
+    def _walked(self, person: Person, scans: tuple[Returns, ...], tracks: Tracks, stamp: float) -> Person:
         """Bring a person up to the last scan before `stamp` [s] with their legs: between slow frames people turn."""
         for returns in scans:
             if person.confirmed and person.track.stamp < returns.stamp <= stamp and returns.stamp > person.felt:
-                track = self.movers.legs.of(person.stature).update(person.track, returns, self.noise)
-                person = person if track is None else replace(person, track=track, felt=returns.stamp)
+                person = self.movers.walked(person, tracks.movers, returns, self.noise)
         return person
 
     def follow_movers(self, tracks: Tracks, views: tuple[float, float], grid: Grid, ground: Ground | None) -> Tracks:

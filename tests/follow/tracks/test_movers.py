@@ -201,14 +201,14 @@ def felt(movers: tuple[Mover, ...], *points: Place) -> dict[int | None, float]:
     [
         ((), True),
         ((walker(7, 2.0, 0.0), walker(None, 2.0, 0.3)), False),
-        # Legs without a name may be the person's own, where these are not known; and what stands is nobody's.
+        # Legs without a number may be the person's own, where these are not known. What stands may be anything.
         ((walker(None, 2.0, 0.3),), True),
         ((walker(7, 2.0, 0.0), replace(walker(None, 2.0, 0.3), left=False)), True),
         ((walker(8, 2.0, 0.3),), False),
         ((walker(8, 2.0, -0.3),), True),
     ],
 )
-def test_who_walks_past_close_by_takes_nobodys_track_along(movers: tuple[Mover, ...], taken: bool) -> None:
+def test_a_passer_by_does_not_take_the_track_along(movers: tuple[Mover, ...], taken: bool) -> None:
     followed = person(7, 2.0, 0.0, 0.9)
     returns = Returns(1.0, np.array([(2.0, 0.18), (2.0, 0.22)]), Odometry())
     after = MOVERS.walked(followed, movers, returns, NOISE)

@@ -268,9 +268,9 @@ class TrackingController:
         return likeness is None or likeness.of(person.number) >= self.selection.identity.sure
 
     def _region(self, person: Person | None, state: TrackingState, observation: Observation) -> Region | None:
-        """Return where the person followed should be in the next frame; None to search all of it as it is.
+        """Return where the person followed should be in the next frame; None to search the whole image as it is.
 
-        Who is lost is looked for in all of it, far away as well.
+        For a lost person that is the whole image enlarged, which shows people who are far away as well.
         """
         everything = Region(0, 0, observation.width, observation.height, FAR_WINDOW)
         if person is None:
@@ -288,5 +288,5 @@ class TrackingController:
         if not self._is_sure(person, state):
             # The right person may be outside it.
             return everything if is_far else None
-        # Who is near and was missed is looked for in all of the image, which would not show who is far.
+        # A near person who was missed is looked for in the whole image as it is, which would not show a far one.
         return region if is_far or person.seen == observation.stamp else None

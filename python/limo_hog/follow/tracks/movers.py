@@ -24,7 +24,7 @@ from limo_hog.follow.tracks.association import Legs, Returns, all_distances, dis
 from limo_hog.follow.tracks.kalman import Noise, Track
 from limo_hog.follow.tracks.person import Person
 
-#: In which order movers take returns.
+#: The order in which movers take returns, see `Movers._rank`.
 _PERSON, _MOVED, _ANYTHING = range(3)
 
 
@@ -90,7 +90,7 @@ class Movers:
         gaps = all_distances(points, expected)
         legs = {mover.stature: self.legs.of(mover.stature) for mover in movers}
         gaps = np.where(gaps < np.array([legs[mover.stature].radius for mover in movers])[:, None], gaps, np.inf)
-        # A return is theirs who are nearest, of those known to be somebody's legs or to move.
+        # Of known people's legs and of what has moved, the nearest has a return.
         whose = gaps[:claims].argmin(axis=0) if claims else np.zeros(len(points), np.int64)
         free, near = np.ones(len(points), bool), gaps < np.inf
         for index, mover in enumerate(movers):
@@ -129,10 +129,10 @@ class Movers:
         noise: Noise,
         is_ground: Callable[[Points], Mask] | None = None,
     ) -> Person:
-        """Return a person brought up to a scan by returns at their legs; as they were where there are none.
+        """Return a person brought up to a scan by the returns at their legs; unchanged where there are none.
 
-        What is nearer to the legs of another that walk is not theirs: who passes close by would take the track along.
-        Legs without a name are another's only where the person's own are known.
+        Returns nearer to legs of another that walk are left out: a passer-by would take the track along. Walking legs
+        without a number count as another's only where the person's own legs were felt lately.
         """
         track, since = kalman.predict(person.track, returns.stamp, noise), returns.stamp - self.forget_s
         is_felt = any(mover.number == person.number and mover.felt > since for mover in movers)
@@ -214,7 +214,7 @@ class Movers:
         return mover.left and mover.scans >= self.fewest_scans and way > self.least_way
 
     def _rank(self, mover: Mover) -> int:
-        """Return whose turn it is to take returns: a known person's legs, what has moved, and what may be anything."""
+        """Return when a mover takes returns: known people's legs first, then what has moved, then anything else."""
         if mover.number is not None:
             return _PERSON
         return _MOVED if self._has_moved(mover) else _ANYTHING

@@ -10,7 +10,7 @@ import numpy as np
 from limo_hog.follow.control.situation import Goal, Situation
 from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.clearance import NO_POINTS, Points, from_odometry
-from limo_hog.follow.sense.observation import Scan
+from limo_hog.follow.sense.observation import Scan, turn_between
 from limo_hog.follow.space.places import Places, Wandering
 from limo_hog.follow.space.routes import Router, along
 from limo_hog.follow.tracks.kalman import Track
@@ -111,11 +111,11 @@ class Lookout:
         dx, dy = (points[None, :] - origins[:, None]).transpose(2, 0, 1)
         seen = (np.hypot(dx, dy) < self.view) & grid.sees(ground, origins, points)
         faced = np.linspace(-math.pi, math.pi, self.directions, endpoint=False)
-        shown = seen[:, None] & (_turn(np.arctan2(dy, dx)[:, None], faced[:, None]) < self.half_view)
+        shown = seen[:, None] & (turn_between(np.arctan2(dy, dx)[:, None], faced[:, None]) < self.half_view)
         share = shown.mean(axis=2)
         courses = np.arctan2(origins[:, 1] - pose.y, origins[:, 0] - pose.x)
         courses[0] = pose.yaw
-        turns = _turn(courses, pose.yaw)[:, None] + _turn(courses[:, None], faced)
+        turns = turn_between(courses, pose.yaw)[:, None] + turn_between(courses[:, None], faced)
         worth = share / (self.settle_s + far[:, None] / self.speed + turns / self.turn_rate)
         if len(hunt.way):
             # Two places of about the same worth would be driven to in turns.
@@ -141,9 +141,3 @@ class Lookout:
         count, random = self.wandering.count, np.random.default_rng([hunt.places.seed, 3])
         chosen = points[random.integers(len(points), size=count)]
         return Places(now, chosen, np.zeros((count, 2)), hunt.places.seed + 1)
-
-
-def _turn(some: Points, others: Points | float) -> Points:
-    """Return how far it is to turn from some directions to others [rad], 0 … pi."""
-    off = some - others
-    return np.asarray(np.abs(off - math.tau * np.rint(off / math.tau)))

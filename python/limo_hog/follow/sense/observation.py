@@ -39,12 +39,18 @@ class Scan:
         if self.measured is not None:
             beams = beams_at(angles, self.angle_min, self.angle_max, len(self.ranges)).astype(np.int64)
             return np.asarray(self.measured[np.clip(beams, 0, len(self.ranges) - 1)])
-        off = angles - (self.angle_min + self.angle_max) / 2
-        return np.abs(off - math.tau * np.rint(off / math.tau)) <= (self.angle_max - self.angle_min) / 2
+        middle, half_view = (self.angle_min + self.angle_max) / 2, (self.angle_max - self.angle_min) / 2
+        return np.asarray(turn_between(angles, middle) <= half_view)
 
     def turned(self, yaw: float) -> Scan:
         """Return the scan of a lidar whose angle 0 looks `yaw` [rad] from straight ahead, by the robot's angles."""
         return replace(self, angle_min=self.angle_min + yaw, angle_max=self.angle_max + yaw) if yaw else self
+
+
+def turn_between(some: Array, others: Array | float) -> Array:
+    """Return how far it is to turn from some directions to others [rad], 0 … pi."""
+    off = some - others
+    return np.asarray(np.abs(off - math.tau * np.rint(off / math.tau)))
 
 
 def beams_at(angles: Array, angle_min: float | Array, angle_max: float | Array, count: int | Array) -> Array:

@@ -17,15 +17,12 @@ from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import Points, lidar_at
 from limo_hog.follow.sense.measurement import STATURE, Measurement
-from limo_hog.follow.sense.observation import Mask, Odometry
+from limo_hog.follow.sense.observation import Mask, Odometry, turn_between
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.association import Legs, Returns, all_distances, distances
 from limo_hog.follow.tracks.kalman import Noise, Track
 from limo_hog.follow.tracks.person import Person
-
-#: The order in which movers take returns, see `Movers._rank`.
-_PERSON, _MOVED, _ANYTHING = range(3)
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,8 +81,7 @@ class Movers:
         if ground is not None:
             points = points[~grid.is_near_blocked(ground, points, lasting=True)]
         kept: list[Mover] = []
-        movers = tuple(sorted(movers, key=self._rank))
-        claims = sum(self._rank(mover) < _ANYTHING for mover in movers)
+        movers, claims = self._in_turn(movers)
         expected = [kalman.predict(mover.track, returns.stamp, noise) for mover in movers]
         gaps = all_distances(points, expected)
         legs = {mover.stature: self.legs.of(mover.stature) for mover in movers}
@@ -213,11 +209,17 @@ class Movers:
         way = math.dist(mover.track.place, mover.began)
         return mover.left and mover.scans >= self.fewest_scans and way > self.least_way
 
-    def _rank(self, mover: Mover) -> int:
-        """Return when a mover takes returns: known people's legs first, then what has moved, then anything else."""
-        if mover.number is not None:
-            return _PERSON
-        return _MOVED if self._has_moved(mover) else _ANYTHING
+    def _in_turn(self, movers: tuple[Mover, ...]) -> tuple[tuple[Mover, ...], int]:
+        """Return movers in the order in which they take returns, and how many of them have a claim to the nearest.
+
+        That is known people's legs, then what has moved; what may be anything comes last.
+        """
+        claims = [mover for mover in movers if mover.number is not None]
+        rest = list[Mover]()
+        for mover in movers:
+            if mover.number is None:
+                (claims if self._has_moved(mover) else rest).append(mover)
+        return (*claims, *rest), len(claims)
 
     def _passed(self, returns: Returns, places: Points) -> NDArray[np.bool_]:
         """Return whether the beams nearest to each of (N, 2) places end behind it, bool (N,)."""
@@ -225,8 +227,7 @@ class Movers:
         x, y = lidar_at(pose, self.robot)
         ends, far = np.arctan2(points[:, 1] - y, points[:, 0] - x), np.hypot(points[:, 0] - x, points[:, 1] - y)
         to, near = np.arctan2(places[:, 1] - y, places[:, 0] - x), np.hypot(places[:, 0] - x, places[:, 1] - y)
-        off = ends[None, :] - to[:, None]
-        beside = np.abs(off - math.tau * np.rint(off / math.tau)) < self.beams
+        beside = turn_between(ends[None, :], to[:, None]) < self.beams
         shortest = np.where(beside, far[None, :], np.inf).min(axis=1, initial=np.inf)
         return np.asarray(beside.any(axis=1) & (shortest > near + self.gap))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from limo_hog.follow.control.rollouts import Rollouts
 from limo_hog.follow.control.situation import Situation
 from limo_hog.follow.parameters import param
-from limo_hog.follow.sense.observation import Array
+from limo_hog.follow.sense.observation import Array, turn_between
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +30,6 @@ class FollowedInView:
             off = rollouts.poses[:, :, 2] - goal.heading - goal.rate * times
         else:
             to = rollouts.places[:, situation.followed] - rollouts.poses[:, :, :2]
-            off = np.arctan2(to[..., 1], to[..., 0]) - rollouts.poses[:, :, 2]
-            off -= math.tau * np.rint(off / math.tau)
+            off = turn_between(np.arctan2(to[..., 1], to[..., 0]), rollouts.poses[:, :, 2])
         off = np.minimum(np.abs(off), self.most)
         return np.asarray((self.share * off + np.maximum(off - self.edge, 0.0)).mean(axis=1))

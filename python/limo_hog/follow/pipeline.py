@@ -128,7 +128,7 @@ class Follower(Generic[S]):
         stamp, (height, width), scan, pose = frame.stamp, frame.image.shape[:2], turned.scan, turned.odometry
         seen = Observation(stamp, width, height, frame.focal_px, detections, region, frame.depth, scan, pose, failure)
         worn, between = clothes_in(frame.image, detections.windows), self._between
-        seen = replace(seen, clothes=worn, between=between, clock=now, depth_stamp=frame.depth_stamp)
+        seen = replace(seen, image=frame.image, clothes=worn, between=between, clock=now, depth_stamp=frame.depth_stamp)
         self._between = ()
         decision = self._guard.step(seen, self._state)
         self._state, self._region = decision.state, decision.region

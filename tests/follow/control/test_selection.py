@@ -93,6 +93,13 @@ def test_legs_alone_are_no_reason_to_stand_for_they_do_not_show_who_it_is() -> N
         assert choose(Choice(None, known(two=0.4), NOW - 1.0), legs).candidates == candidates
 
 
+def test_of_two_known_by_legs_alone_the_likelier_is_followed() -> None:
+    legs = [replace(plain(number, number), seen=NOW - 2.0, felt=NOW) for number in (1, 2)]
+    for chance, number in ((0.55, 2), (0.45, 1)):
+        after = choose(Choice(1, known(one=0.3, two=chance), NOW), *legs)
+        assert (after.number, after.candidates) == (number, ())
+
+
 def test_a_person_who_is_followed_in_doubt_is_followed_on_and_not_looked_at() -> None:
     after = choose(Choice(1, known(one=0.3), NOW), plain(1))
     assert (after.number, after.candidates, after.unsure_at) == (1, (), NOW)
@@ -106,7 +113,7 @@ def test_a_track_that_is_another_by_nine_in_ten_is_left_only_where_it_is_measure
 
 def test_a_track_that_is_just_as_likely_as_is_possible_is_kept() -> None:
     # Chances that no frame changes, and a bound that floating point holds exactly.
-    exact = replace(SELECTION, other_below=0.25, identity=replace(SELECTION.identity, passes=0.0))
+    exact = replace(SELECTION, other_below=0.25, identity=replace(SELECTION.identity, passes=0.0, near_s=0.0))
     for chance, number in ((0.25, 1), (0.2499, None)):
         assert exact.choose(at(NOW, plain(1)), Choice(1, known(one=chance), NOW)).number == number
 

@@ -1,10 +1,14 @@
 """Clothes are told apart by their colours, in whatever light, and not by how a box happens to sit."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.follow.views import BLUE, GREEN, RED, dressed
+from tests.follow.views import BLUE, FOCAL, GREEN, HEIGHT, RED, WIDTH, before_wall, dressed, flat, look, there
 
+from limo_hog.follow.robot import LIMO
+from limo_hog.follow.sense.measurement import Visibility
 from limo_hog.follow.sense.observation import Appearance, clothes_in
 
 APPEARANCE = Appearance()
@@ -87,3 +91,35 @@ def test_a_shirt_that_is_half_above_the_image_is_seen_all_the_same() -> None:
     # The chest is looked at from .28 to .42 of the box; the image begins within that, or below it.
     image = np.full((480, 640, 3), RED, np.uint8)
     assert [bool(np.isfinite(worn(image, (200, y, 120, 240))[0]).all()) for y in (-85, -200)] == [True, False]
+
+
+def glimpsed(
+    off_px: int = 0, place: tuple[float, float] = (2.084, 0.0), **readings: NDArray[np.generic] | None
+) -> NDArray[np.float64] | None:
+    """Return what shows of somebody in `BOX`, 2 m before the camera, who is expected at a place but for some pixels."""
+    x, y, w, h = BOX
+    image, depth = dressed(BOX, RED, BLUE), before_wall(2.0, BOX)
+    window, middle, aside = 2.0 * h, 2.0 * (y + h / 2 - HEIGHT / 2), 2.0 * (WIDTH / 2 - x - w / 2 - off_px) / FOCAL
+    seen = replace(look(), **{"image": image, "depth": depth, **readings})  # type: ignore[arg-type]
+    return Visibility().glimpse((place[0], place[1] + aside), window, middle, seen, LIMO)
+
+
+@pytest.mark.parametrize("off_px", [0, 25, -25])
+def test_of_a_person_who_was_not_found_a_glimpse_shows_the_clothes_where_their_body_is(off_px: int) -> None:
+    assert there(glimpsed(off_px)) == pytest.approx(worn(dressed(BOX, RED, BLUE)))
+
+
+def test_there_is_no_glimpse_of_a_person_hidden_gone_too_near_or_out_of_the_image() -> None:
+    assert glimpsed(image=None) is None
+    assert glimpsed(depth=None) is None
+    assert glimpsed(depth=before_wall(1.7, BOX)) is None
+    assert glimpsed(depth=flat(8.0)) is None
+    assert glimpsed(depth=np.full((HEIGHT, WIDTH), np.nan, np.float32)) is None
+    for place in ((0.4, 0.0), (-2.0, 0.0), (2.084, 2.0), (0.2, 1.0)):
+        assert glimpsed(place=place) is None
+
+
+def test_a_strip_as_far_away_as_the_person_is_no_body() -> None:
+    depth = flat(8.0)
+    depth[:, 258:261] = 2.0
+    assert glimpsed(depth=depth) is None

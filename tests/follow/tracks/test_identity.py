@@ -101,6 +101,44 @@ def test_a_track_kept_by_legs_alone_beside_another_may_not_be_the_person_any_mor
         assert low <= known.of(1) <= high
 
 
+def test_the_person_whose_legs_may_be_those_of_somebody_tracked_beside_is_one_of_the_two() -> None:
+    known = followed()
+    for frame in range(11, 31):
+        stamp = 0.1 * frame
+        one, other = (replace(person(number, stamp, 0.3 * number, measured=1.0), felt=stamp) for number in (1, 2))
+        known = IDENTITY.update(known, at(stamp, one, other))
+    assert known.of(2) > 0.3
+    assert known.of(1) + known.of(2) > 0.95
+
+
+def glimpses(clothes: Clothes, count: int, chance: float = 0.5) -> float:
+    """Return the chance of the person's track after some frames that showed clothes where HOG found nobody."""
+    known = replace(followed(), chances=((1, chance),), at=-10.0)
+    for frame in range(11, 11 + count):
+        one = person(1, 0.1 * frame, clothes=clothes, measured=1.0)
+        one = replace(one, felt=0.1 * frame, glimpsed=0.1 * frame, tall=None)
+        known = IDENTITY.update(known, at(0.1 * frame, one))
+    return known.of(1)
+
+
+def test_a_glimpse_of_the_persons_clothes_tells_less_than_a_box_and_one_of_others_next_to_nothing() -> None:
+    box = IDENTITY.update(replace(followed(), chances=((1, 0.5),), at=-10.0), at(1.1, person(1, 1.1))).of(1)
+    assert 0.6 < glimpses(IN_RED, 1) < box
+    assert glimpses(IN_RED, 10) > 0.98
+    assert 0.45 < glimpses(IN_GREEN, 1) < 0.5
+    # What is before the person is not there for long.
+    assert glimpses(IN_GREEN, 100, chance=0.9) < 0.5
+
+
+def test_a_track_that_was_just_the_persons_is_theirs_again_where_no_other_begins() -> None:
+    for last_s, low, high in ((0.0, 0.75, 0.9), (-10.0, 0.4, 0.6)):
+        known = replace(followed(), chances=((1, 0.5),), at=last_s)
+        for frame in range(11, 40):
+            one = replace(person(1, 0.1 * frame, clothes=None, measured=1.0), felt=0.1 * frame, tall=None)
+            known = IDENTITY.update(known, at(0.1 * frame, one))
+        assert low < known.of(1) < high
+
+
 def test_another_in_the_same_clothes_is_not_the_person_whose_legs_go_on_too_near_for_the_camera() -> None:
     known = followed()
     for frame in range(11, 80):

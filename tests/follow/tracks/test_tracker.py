@@ -154,6 +154,15 @@ def test_a_person_who_is_not_found_for_a_second_walked_on_and_is_no_less_a_perso
         assert (after_.log_odds < one.log_odds) == falls
 
 
+def test_a_confirmed_person_who_is_not_found_is_glimpsed_where_the_depth_image_shows_them() -> None:
+    for confirmed, depth, glimpsed in ((True, 1.916, 1.0), (True, 8.0, -np.inf), (False, 1.916, -np.inf)):
+        one = replace(unseen(1, 0.9), window=WINDOW, centre=-120.0, confirmed=confirmed, log_odds=2.0)
+        seen = replace(look(stamp=1.0), image=np.full((480, 640, 3), 90, np.uint8), depth=flat(depth))
+        after_ = TRACKER.update(seen, Tracks(people=(one,), stamp=0.9))[0].people[0]
+        assert after_.glimpsed == glimpsed
+        assert (after_.worn is not None) == (glimpsed == 1.0)
+
+
 def around(followed: Person | None, people: tuple[Person, ...], *movers: object) -> tuple[int, list[float], bool]:
     """Return how many are around at 1 s, the x of those who are others, and whether one is the person followed."""
     tracks = Tracks(people, stamp=1.0, movers=movers)  # type: ignore[arg-type]
@@ -186,6 +195,13 @@ def test_what_moves_may_be_the_person_until_the_camera_has_shown_it_twelve_times
         for number, own in ((None, 1), (3, 1), (4, 0)):
             mover = replace(walker(number, 2.0, 0.0), shown=shown)
             assert len(TRACKER.may_be(3, Tracks(movers=(mover,)), 1.0)) == may * own
+
+
+def test_what_moves_where_another_person_was_just_measured_is_their_legs() -> None:
+    mover = walker(None, 2.0, 0.0)
+    for number, aside, stamp, may in ((4, 0.3, 0.8, 0), (4, 0.4, 0.8, 1), (4, 0.3, 0.4, 1), (3, 0.3, 0.8, 1)):
+        other = unseen(number, stamp, 2.0, aside)
+        assert len(TRACKER.may_be(3, Tracks(people=(other,), movers=(mover,)), 1.0)) == may
 
 
 def with_legs(one: Person, stamp: float, place: tuple[float, float], **tracks: object) -> Person:

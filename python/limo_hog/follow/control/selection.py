@@ -80,7 +80,7 @@ class Selection:
             return choice
         likeness = self.identity.update(choice.likeness, tracks)
         choice = replace(choice, likeness=likeness)
-        chances, measured = dict(likeness.chances), self.measured(tracks)
+        chances, measured, likelier = dict(likeness.chances), self.measured(tracks), None
         about = [person for person in measured if chances[person.number] >= self.other_below]
         about.sort(key=lambda person: -chances[person.number])
         if about:
@@ -89,6 +89,7 @@ class Selection:
             next_best = chances[rest[0].number] if rest else 0.0
             if chance >= self.min_same and chance >= self.min_same_odds * next_best:
                 return Choice(best.number, likeness, best.measured if chance >= self.identity.sure else choice.measured)
+            likelier = best if chance >= self.min_same else None
             # Legs alone do not show who it is, however long they are looked at.
             about = [person for person in about if now - person.seen <= self.identity.unseen_s]
         if about:
@@ -104,12 +105,12 @@ class Selection:
                 # The person may have come back: they are looked at, not turned away from.
                 return replace(choice, candidates=(best.number,))
         choice = replace(choice, candidates=(), unsure_at=choice.unsure_at if about else None)
-        followed = tracks.person(choice.number)
+        # The track may have gone over to another person.
+        followed = likelier or tracks.person(choice.number)
         if followed is None:
             return choice
-        # The track may have gone over to another person.
         strange = followed in measured and chances[followed.number] < self.other_below
-        return replace(choice, number=None) if strange or not self.is_candidate(followed) else choice
+        return replace(choice, number=None if strange or not self.is_candidate(followed) else followed.number)
 
     def measured(self, tracks: Tracks) -> list[Person]:
         """Return the people who may be followed and were measured just now."""

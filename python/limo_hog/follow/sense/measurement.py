@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import RobotGeometry
-from limo_hog.follow.sense.observation import Clothes, Observation
+from limo_hog.follow.sense.observation import Clothes, ColourSampling, Observation, clothes_in
 from limo_hog.follow.sense.region import Region
 
 #: What is nearer than this to a person's axis is the person's own [m]. Chosen: legs in mid-stride and an arm.
@@ -176,6 +176,9 @@ class Visibility:
     shown: float = param(0.48, "window heights", "Part of each half of a window that must be shown.")
     cut: float = param(0.06, "window heights", "Share that a kept distance may cut off at the top.")
     occluder: float = param(0.5, "m", "Something nearer than the person by more than this hides them.")
+    body: float = param(0.25, "m", "What is as far away as a person to within this is their body.")
+    reach: float = param(0.2, "window heights", "Their body is no further aside than this from where it is expected.")
+    nearest: float = param(0.4, "m", "Of a person nearer to the camera it shows no clothes.")
 
     def least_distance(self, window: float, centre: float, image_height: int) -> float:
         """Return how near a person may be with their window in the image, but for `cut` of it [m].
@@ -210,6 +213,37 @@ class Visibility:
             return True
         there = person_depth(observation.depth, np.array([column, middle, 0, 0], np.int32))
         return there is None or there >= distance - self.occluder
+
+    def glimpse(
+        self, place: tuple[float, float], window: float, centre: float, observation: Observation, robot: RobotGeometry
+    ) -> Clothes | None:
+        """Return what a person wears who was not found at a place [m], base frame; None where nobody is to be seen.
+
+        The depth image must show something as far away; `window` and `centre` as in `Person`.
+        """
+        ahead, aside = place[0] - robot.camera_x, place[1]
+        image, depth = observation.image, observation.depth
+        if image is None or depth is None or ahead < self.nearest:
+            return None
+        height, column = window / ahead, observation.width / 2 - observation.focal_px * aside / ahead
+        middle = observation.height / 2 + centre / ahead
+        chest = round(middle + (ColourSampling().chest[0] - 0.5) * height)
+        if not 0 <= chest < observation.height:
+            return None
+        left = max(round(column - self.reach * height), 0)
+        strip = depth[chest, left : max(round(column + self.reach * height), 0)]
+        near = np.zeros(len(strip) + 2, bool)
+        near[1:-1] = np.abs(strip - ahead) < self.body
+        bodies = left + np.flatnonzero(near[1:] != near[:-1]).reshape(-1, 2).mean(axis=1)
+        if len(bodies) == 0:
+            return None
+        column = bodies[np.abs(bodies - column).argmin()]
+        there = person_depth(depth, np.array([column, chest, 0, 0], np.int32), 10)
+        if there is None or abs(there - ahead) > self.body:
+            return None
+        box = np.array([[column - height / 4, middle - height / 2, height / 2, height]]).astype(np.int32)
+        worn = clothes_in(image, box)[0]
+        return worn if np.isfinite(worn).all() else None
 
 
 @dataclass(frozen=True, slots=True)

@@ -125,6 +125,7 @@ class Observation:
     #: When the readings were at hand, on the robot's own clock [s], which is no sensor's; None where `now` serves.
     clock: float | None = None
     depth_stamp: float | None = None  #: Of the newest depth image that has come [s]; None for `stamp`.
+    image: NDArray[np.uint8] | None = None  #: uint8 (height, width, 3) BGR or (height, width); None where not kept.
     now: float = field(init=False)  #: The newest stamp of all sensors [s]: a camera frame may arrive late.
     at: float = field(init=False)  #: When the readings were at hand, on the robot's own clock [s].
 

@@ -63,12 +63,16 @@ class Identity:
     again: float = param(0.5, "1", "Share of its own evidence that a box counts for after a track's first.")
     steady: float = param(0.1, "1", "The same for the stature, and for everything while the legs are the same.")
     stays: float = param(0.5, "1", "Probability from which a track counts as the person for `steady`.")
+    glimpse: float = param(0.4, "1", "The same for clothes that fit where HOG found nobody.")
+    misfit: float = param(0.02, "1", "The same for clothes there that do not: somebody may be before the person.")
     most: float = param(2.5, "log-odds", "The most that a box can tell either way.")
     passes: float = param(0.002, "1", "Chance that the next box of a track is on another person, where it fits.")
     strained: float = param(0.1, "1", "The same where its place or size contradicts the track.")
     legs_s: float = param(1.0, "s", "Legs that are the same for this time, with nobody's near, are the same person's.")
     legs_apart: float = param(0.4, "m", "Other legs nearer than this may have changed places with them.")
     fades_s: float = param(2.0, "s", "Time constant with which an unmeasured track loses the person.")
+    shows_s: float = param(2.0, "s", "Time constant with which a lost person who is near would have a track.")
+    near_s: float = param(4.0, "s", "A person is near for this time after it was last sure where they are.")
     meets: float = param(0.5, "m", "Two tracks nearer than this to each other may swap their people.")
     swaps: float = param(0.2, "1/m", "Chance of a swap for each metre by which they pass each other.")
     unseen_s: float = param(0.3, "s", "A person not measured for longer may be a track that begins.")
@@ -95,19 +99,24 @@ class Identity:
         # The first boxes of a track that goes on show what the person looks like: none of them can contradict it.
         begins = [person for person in seen if person.number == known.traits.number and not person.strained]
         learns = known.traits.boxes < self.settled
-        settling = [person.number for person in begins if learns and self._is_alone(person, tracks)]
-        for person in seen:
+        settling = [person.number for person in begins if learns and not self._beside(person, tracks)]
+        glimpsed = [] if learns else [person for person in tracks.people if person.glimpsed == tracks.stamp]
+        for person in (*seen, *glimpsed):
             if person.number in settling:
                 continue
-            stays = before.get(person.number, 0.0) >= self.stays and person.number in walking
             evidence = self._evidence(known.traits, others, person, variance, first=person.age <= 1)
+            if person.glimpsed == tracks.stamp:
+                evidence *= self.glimpse if evidence > 0.0 else self.misfit
+            stays = before.get(person.number, 0.0) >= self.stays and person.number in walking
             chances[person.number] *= math.exp(self.steady * evidence if stays else evidence)
+        if (tracks.stamp or 0.0) - known.at < self.near_s:
+            absent *= math.exp(-tracks.period / self.shows_s)
         total = sum(chances.values()) + absent
         chances = {number: odds / total for number, odds in chances.items()}
         known = replace(known, chances=tuple(chances.items()))
         own = [person for person in seen if chances[person.number] >= self.sure or person.number in settling]
         for person in own:
-            traits = self._moved(known.traits, person, variance) if self._is_alone(person, tracks) else known.traits
+            traits = known.traits if self._beside(person, tracks) else self._moved(known.traits, person, variance)
             known = replace(known, place=person.track.place, at=person.measured, traits=traits)
         # While it is sure where the person is, by legs alone too, whoever else is seen is another.
         lately = (tracks.stamp or 0.0) - self.unseen_s
@@ -125,15 +134,7 @@ class Identity:
         stamp = tracks.stamp or 0.0
         chances = {number: chance for number, chance in known.chances if number in people}
         gone = {person.number for person in people.values() if self._is_gone(person, tracks, walking)}
-        for number in chances:
-            person = people[number]
-            if number in gone:
-                leaves = 1.0 - math.exp(-tracks.period / self.fades_s)
-            elif number in walking:
-                leaves = 0.0
-            else:
-                leaves = self.strained if person.strained and person.seen == stamp else self.passes
-            chances[number] *= 1.0 - leaves
+        chances = self._stayed(chances, people, tracks, walking, gone)
         lost_s = stamp - known.at
         share = min(max(lost_s - self.unseen_s, 0.0) / self.fades_s, 1.0) / 2
         for number, person in people.items():
@@ -160,6 +161,31 @@ class Identity:
                 chances[right.number] -= swapped
         return chances
 
+    def _stayed(
+        self,
+        chances: dict[int, float],
+        people: dict[int, Person],
+        tracks: Tracks,
+        walking: AbstractSet[int],
+        gone: AbstractSet[int],
+    ) -> dict[int, float]:
+        """Return the probabilities that are left on the tracks, or pass to those whose legs theirs may be."""
+        stamp, gains = tracks.stamp or 0.0, dict.fromkeys(chances, 0.0)
+        for number, chance in chances.items():
+            person = people[number]
+            if number in gone:
+                leaves = 1.0 - math.exp(-tracks.period / self.fades_s)
+            elif number in walking:
+                leaves = 0.0
+            else:
+                leaves = self.strained if person.strained and person.seen == stamp else self.passes
+            gains[number] -= leaves * chance
+            beside = self._beside(person, tracks) if number in gone and stamp - person.measured <= self.unseen_s else []
+            takes = [other.number for other in beside if other.number in chances]
+            for other in takes:
+                gains[other] += leaves * chance / len(takes)
+        return {number: chance + gains[number] for number, chance in chances.items()}
+
     def _reaches(self, known: Likeness, person: Person, lost_s: float) -> bool:
         """Whether the person followed, lost for `lost_s` [s], can have walked to where a track is."""
         return math.dist(person.track.place, known.place) < self.reach + self.speed * lost_s
@@ -173,7 +199,7 @@ class Identity:
         beside = [mover.track.place for mover in tracks.movers if mover.number != person.number]
         here = person.track.place
         near = min([math.dist(here, place) for place in beside], default=math.inf) < self.meets
-        return near or not self._is_alone(person, tracks)
+        return near or bool(self._beside(person, tracks))
 
     def _walks_on(self, person: Person, tracks: Tracks) -> bool:
         """Whether the scan shows that a track's legs are those they were, with nobody's beside them to change with."""
@@ -182,11 +208,11 @@ class Identity:
         own = [mover.track.place for mover in kept if mover.felt - mover.named >= self.legs_s]
         return any(all(math.dist(here, place) > self.legs_apart for place in others) for here in own)
 
-    def _is_alone(self, person: Person, tracks: Tracks) -> bool:
-        """Whether nobody is so near that a person's box may show both or the other."""
+    def _beside(self, person: Person, tracks: Tracks) -> list[Person]:
+        """Return everyone who is so near that a person's box may show both or the other."""
         lately = (tracks.stamp or 0.0) - self.unseen_s
         others = [other for other in tracks.people if other is not person and other.measured >= lately]
-        return all(separation(other, person) > self.meets for other in others)
+        return [other for other in others if separation(other, person) <= self.meets]
 
     def _evidence(
         self, own: Traits, others: Sequence[Traits], person: Person, variance: float, *, first: bool

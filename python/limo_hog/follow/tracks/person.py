@@ -34,8 +34,9 @@ class Person:
     misses: int = 0
     felt: float = -math.inf  #: Stamp of the last scan with their legs [s].
     clothes: Clothes | None = None  #: What they wear; None while no colour image tells.
-    worn: Clothes | None = None  #: Clothes and window as the last box showed them; None where it did not.
+    worn: Clothes | None = None  #: Clothes and window as the last box or glimpse showed them; None where it did not.
     tall: float | None = None
+    glimpsed: float = -math.inf  #: Stamp of the last frame that showed the clothes where HOG found nobody [s].
     strained: bool = False  #: Whether the last box was not where the person was expected, or not of their size.
     measured: float = field(init=False)  #: Stamp of the last frame or scan that showed the person [s].
 

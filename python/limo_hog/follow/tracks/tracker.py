@@ -96,9 +96,8 @@ class Tracker:
         people, boxes, recall = list[Person](), dict[int, int](), tracks.recall
         for who, person in enumerate(known):
             bearing, distance = bearing_range(person.track, pose)
-            expected = self.visibility.expected(
-                bearing, distance, person.window, person.centre, observation, confirmed=person.confirmed
-            )
+            sizes, sure = (person.window, person.centre), person.confirmed
+            expected = self.visibility.expected(bearing, distance, *sizes, observation, confirmed=sure)
             height = person.window / max(distance, 0.3)
             chance = self.existence.recall_of(tracks.recall, height)
             if expected and person.confirmed:
@@ -114,7 +113,7 @@ class Tracker:
                 walks = any(mover.number == person.number for mover in moving)
                 evidence = 0.0 if walks else self.existence.of_miss(chance)
                 person = self.existence.update(person, evidence, found=False)
-            people.append(person)
+            people.append(person if who in pairs else self._glimpsed(person, observation, pose))
         number = tracks.next_number
         for which, seen in enumerate(measured):
             if which not in boxes.values() and which not in flat and self.association.is_new(seen, people, pose):
@@ -123,6 +122,15 @@ class Tracker:
                 number += 1
         learnt = replace(tracks, recall=recall, variance=variance)
         return replace(learnt, people=tuple(people), next_number=number, boxes=tuple(boxes.items())), boxes
+
+    def _glimpsed(self, person: Person, observation: Observation, pose: Odometry) -> Person:
+        """Note what a confirmed person without a box wears, where the camera shows it."""
+        bearing, distance = bearing_range(person.track, pose)
+        place = distance * math.cos(bearing), distance * math.sin(bearing)
+        worn = None
+        if person.confirmed:
+            worn = self.visibility.glimpse(place, person.window, person.centre, observation, self.robot)
+        return person if worn is None else replace(person, worn=worn, tall=None, glimpsed=observation.stamp)
 
     def begin(self, number: int, seen: Measurement, stamp: float, pose: Odometry) -> Person:
         """Begin to track a box that belongs to no known person."""
@@ -268,7 +276,14 @@ class Tracker:
     def may_be(self, number: int | None, tracks: Tracks, now: float) -> list[Track]:
         """Return what moves in the scan and may be the person of a number, or one not shown yet, as of `now` [s]."""
         moving = [mover for mover in self.movers.moving(tracks.movers) if mover.number in (number, None)]
-        return [kalman.predict(mover.track, now, self.noise) for mover in moving if mover.shown < self.movers.looks]
+        moved = [kalman.predict(mover.track, now, self.noise) for mover in moving if mover.shown < self.movers.looks]
+        others = [
+            kalman.predict(person.track, now, self.noise).place
+            for person in tracks.people
+            if person.confirmed and person.number != number and person.measured > now - self.movers.forget_s
+        ]
+        legs = self.movers.legs.radius
+        return [track for track in moved if all(math.dist(track.place, place) > legs for place in others)]
 
     def _remember(self, observation: Observation, tracks: Tracks) -> Tracks:
         poses, scans = tracks.poses, tracks.scans

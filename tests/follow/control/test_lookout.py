@@ -38,6 +38,10 @@ def situated(ground: Ground, pose: Odometry = HERE, grid: Grid = GRID) -> Situat
     return Situation(pose.stamp, pose, Twist(), LIMO, 1.0, 0.1, 0.1, nobody, None, NO_POINTS, grid, ground, nobody)
 
 
+#: What moves in the scan and may be the person.
+NOTHING = np.zeros((0, 4))
+
+
 def hunt_for(points: Points, planned: float) -> Hunt:
     """Return the hunt for a person who may be at each of (N, 2) places."""
     track = kalman.initiate(NOW - 1.0, 0.0, 2.0, HERE, Noise())
@@ -47,7 +51,7 @@ def hunt_for(points: Points, planned: float) -> Hunt:
 def test_no_person_is_where_the_camera_shows_none() -> None:
     sure = Lookout(wandering=Wandering(found=1.0))
     around = np.array([(r * np.cos(a), r * np.sin(a)) for r in (1.0, 3.3, 5.8, 6.2) for a in np.arange(-3, 3.1, 0.3)])
-    after = sure.step(hunt_for(around, NOW), BLIND, situated(free_ground()))
+    after = sure.step(hunt_for(around, NOW), BLIND, NOTHING, situated(free_ground()))
     shown = (np.abs(np.arctan2(around[:, 1], around[:, 0])) < 0.5) & (np.hypot(*around.T) < 6.0)
     assert shown.any()
     np.testing.assert_array_equal(np.unique(after.places.points, axis=0), np.unique(around[~shown], axis=0))
@@ -65,7 +69,7 @@ class Counted(Grid):
 @pytest.mark.parametrize("count", [1, 40, 150, 1000])
 def test_as_many_places_are_compared_however_large_the_room_and_many_the_guesses(count: int) -> None:
     grid = Counted()
-    hunt = LOOKOUT.step(hunt_for(np.full((count, 2), 1.5), -np.inf), BLIND, situated(free_ground(), grid=grid))
+    hunt = LOOKOUT.step(hunt_for(np.full((count, 2), 1.5), -np.inf), BLIND, NOTHING, situated(free_ground(), grid=grid))
     origins, places = grid.asked[-1]
     assert hunt.planned == NOW
     assert LOOKOUT.candidates <= origins <= 2 * LOOKOUT.candidates + 1
@@ -77,10 +81,10 @@ def test_a_place_that_is_driven_to_is_kept_until_another_is_half_as_good_again()
     for more, kept in ((1.3, True), (2.0, False)):
         few, many = np.full((24, 2), (0.0, 7.0)), np.full((round(24 * more), 2), (0.0, -7.0))
         hunt = hunt_for(np.concatenate([few, many]), -np.inf)
-        fresh = lookout.step(hunt, BLIND, situated(free_ground()))
+        fresh = lookout.step(hunt, BLIND, NOTHING, situated(free_ground()))
         assert fresh.way[-1, 1] < 0
         mirrored = fresh.way * (1.0, -1.0)
-        after = lookout.step(replace(hunt, way=mirrored), BLIND, situated(free_ground()))
+        after = lookout.step(replace(hunt, way=mirrored), BLIND, NOTHING, situated(free_ground()))
         assert (after.way[-1, 1] > 0) == kept
 
 
@@ -118,7 +122,7 @@ def test_a_way_is_faced_half_a_metre_on_and_driven_at_six_tenths() -> None:
 
 
 def planned(points: list[tuple[float, float]], lookout: Lookout = LOOKOUT, at: float = -math.inf) -> Hunt:
-    return lookout.step(hunt_for(np.array(points), at), BLIND, situated(free_ground()))
+    return lookout.step(hunt_for(np.array(points), at), BLIND, NOTHING, situated(free_ground()))
 
 
 def test_where_all_places_are_in_sight_it_turns_to_them_and_chooses_anew_in_time() -> None:
@@ -188,7 +192,7 @@ def emptied(ground: Ground, lost_s: float = 4.0) -> Hunt:
     clear = replace(BLIND, ranges=np.full(292, 8.0, np.float32))
     hunt = hunt_for(np.full((150, 2), (2.0, 0.0)), -math.inf)
     track = replace(hunt.track, stamp=NOW - lost_s, mean=(0.0, 0.0, 0.0, 0.0))
-    return LOOKOUT.step(replace(hunt, track=track, facing=(1.0, 1.0)), clear, situated(ground))
+    return LOOKOUT.step(replace(hunt, track=track, facing=(1.0, 1.0)), clear, NOTHING, situated(ground))
 
 
 def test_where_no_place_is_left_it_begins_on_free_ground_not_seen_for_two_seconds() -> None:

@@ -178,7 +178,18 @@ def test_no_person_is_where_beams_pass_which_begin_where_the_robots_lidar_is() -
 
 def test_what_is_seen_to_be_empty_leaves_the_other_places() -> None:
     both = Places(0.0, at((1.0, 0.5), (3.0, 0.5)), np.zeros((2, 2)))
-    left = there(WANDERING.look(both, wall_scan(), np.zeros(2, bool), HERE, LIMO))
+    left = there(WANDERING.look(both, wall_scan(), np.zeros(2, bool), np.zeros((0, 4)), HERE, LIMO))
     assert left.points.tolist() == [[3.0, 0.5], [3.0, 0.5]]
     near = Places(0.0, at((1.0, 0.5)), np.zeros((1, 2)))
-    assert WANDERING.look(near, wall_scan(), np.zeros(1, bool), HERE, LIMO) is None
+    assert WANDERING.look(near, wall_scan(), np.zeros(1, bool), np.zeros((0, 4)), HERE, LIMO) is None
+
+
+def test_whoever_is_not_where_they_were_believed_may_be_what_moves_nearest_to_there() -> None:
+    both = Places(0.0, at((1.0, 0.5), (1.0, -0.5), (3.0, 0.5)), np.ones((3, 2)))
+    moving = np.array([(1.8, 0.9, 0.1, 0.2), (1.8, -0.9, 0.3, 0.4), (0.0, 5.0, 0.5, 0.6)])
+    left = there(WANDERING.look(both, wall_scan(), np.zeros(3, bool), moving, HERE, LIMO))
+    assert left.points.tolist() == [[1.8, 0.9], [1.8, -0.9], [3.0, 0.5]]
+    assert left.velocities.tolist() == [[0.1, 0.2], [0.3, 0.4], [1.0, 1.0]]
+    # What moves further away than beams tell cannot be it.
+    far = both.points[:1], both.velocities[:1]
+    assert WANDERING.look(Places(0.0, *far), wall_scan(), np.zeros(1, bool), moving[2:], HERE, LIMO) is None

@@ -10,7 +10,7 @@ import numpy as np
 from limo_hog.follow.control.situation import Goal, Situation
 from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.clearance import NO_POINTS, Points, from_odometry
-from limo_hog.follow.sense.observation import Scan, turn_between
+from limo_hog.follow.sense.observation import Array, Scan, turn_between
 from limo_hog.follow.space.places import Places, Wandering
 from limo_hog.follow.space.routes import Router, along
 from limo_hog.follow.tracks.kalman import Track
@@ -62,8 +62,11 @@ class Lookout:
             places.points[~situation.grid.sees(situation.ground, here, places.points)[0]] = here
         return Hunt(track, places)
 
-    def step(self, hunt: Hunt, scan: Scan, situation: Situation) -> Hunt:
-        """Let the person walk on in mind, remove what is seen to be empty, and choose a way where one is due."""
+    def step(self, hunt: Hunt, scan: Scan, moving: Array, situation: Situation) -> Hunt:
+        """Let the person walk on in mind, remove what is seen to be empty, and choose a way where one is due.
+
+        `moving` (M, 4) is what moves in the scan and may be the person: x, y [m], vx, vy [m/s], odometry frame.
+        """
         now, pose, grid, ground = situation.now, situation.pose, situation.grid, situation.mapped
         places = hunt.places
         while now - places.stamp > 1e-6:
@@ -72,7 +75,9 @@ class Lookout:
         ahead = from_odometry(places.points, pose)
         off, far = np.arctan2(ahead[:, 1], ahead[:, 0]), np.hypot(*ahead.T)
         shown = (np.abs(off) < self.half_view) & (far < self.view) & grid.sees(ground, here, places.points)[0]
-        left = self.wandering.look(places, scan, shown, pose, situation.robot) or self._anywhere(hunt, situation)
+        left = self.wandering.look(places, scan, shown, moving, pose, situation.robot) or self._anywhere(
+            hunt, situation
+        )
         if left is None:
             return replace(hunt, places=places, way=NO_POINTS, facing=None, planned=now)
         hunt = replace(hunt, places=left)

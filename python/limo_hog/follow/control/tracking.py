@@ -240,7 +240,9 @@ class TrackingController:
         young = known is not None and situation.now - known.stamp < lookout.give_up_s
         if lost and known is not None and young and scan is not None and situation.ground is not None:
             hunt = state.hunt or lookout.begin(known, choice.number or 0, situation)
-            hunt = lookout.step(hunt, scan, situation)
+            moving = self.tracker.may_be(choice.number, state.tracks, situation.now)
+            means = np.array([*map(attrgetter("mean"), moving)]).reshape(-1, 4)
+            hunt = lookout.step(hunt, scan, means, situation)
             goal, reason = lookout.goal(hunt, situation, self.planner.sampling.times)
             places, way = lookout.ways(hunt, situation)
             belief, state = Belief(places=places, way=way), replace(state, hunt=hunt)

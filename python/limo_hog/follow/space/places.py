@@ -75,22 +75,31 @@ class Wandering:
         velocities[blocked] = speed / self.walk * fresh[blocked]
         return Places(stamp, points, velocities, places.seed + 1)
 
-    def look(self, places: Places, scan: Scan, shown: Mask, pose: Odometry, robot: RobotGeometry) -> Places | None:
+    def look(
+        self, places: Places, scan: Scan, shown: Mask, moving: Array, pose: Odometry, robot: RobotGeometry
+    ) -> Places | None:
         """Remove places where the person was not found, in favour of the others; None where no place is left.
 
         Nobody is where the beams of the newest scan, taken at `pose`, pass; `shown`, bool (N,), are the places that the
-        camera shows, without a person in them.
+        camera shows, without a person in them. A person who is not there may be what moves nearest to there in the
+        scan: `moving`, float64 (M, 4), x, y, vx, vy.
         """
         random = np.random.default_rng([places.seed, 2])
         kept = ~self.looked_through(places.points, scan, pose, robot)
         kept &= ~shown | (random.random(len(shown)) > self.found)
         if kept.all():
             return places
+        points, velocities = places.points.copy(), places.velocities.copy()
+        if len(moving):
+            gaps = np.hypot(*(points[:, None] - moving[None, :, :2]).transpose(2, 0, 1))
+            goes = ~kept & (gaps.min(axis=1) < self.far)
+            points[goes], velocities[goes] = np.split(moving[gaps.argmin(axis=1)[goes]], 2, axis=1)
+            kept |= goes
         left = np.flatnonzero(kept)
         if len(left) == 0:
             return None
         chosen = np.concatenate([left, left[random.integers(len(left), size=(~kept).sum())]])
-        return Places(places.stamp, places.points[chosen], places.velocities[chosen], places.seed)
+        return Places(places.stamp, points[chosen], velocities[chosen], places.seed)
 
     def looked_through(self, points: Points, scan: Scan, pose: Odometry, robot: RobotGeometry) -> Mask:
         """Return for each point, bool (N,), whether all beams near it pass."""

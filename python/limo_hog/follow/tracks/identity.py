@@ -63,15 +63,15 @@ class Identity:
     again: float = param(0.5, "1", "Share of its own evidence that a box counts for after a track's first.")
     steady: float = param(0.1, "1", "The same for the stature, and for everything while the legs are the same.")
     stays: float = param(0.5, "1", "Probability from which a track counts as the person for `steady`.")
-    glimpse: float = param(0.4, "1", "The same for clothes that fit where HOG found nobody.")
-    misfit: float = param(0.02, "1", "The same for clothes there that do not: somebody may be before the person.")
+    glimpse: float = param(0.4, "1", "Share of their evidence that clothes count for that fit where HOG found nobody.")
+    misfit: float = param(0.02, "1", "The same for clothes there that do not fit: somebody may be before the person.")
     most: float = param(2.5, "log-odds", "The most that a box can tell either way.")
     passes: float = param(0.002, "1", "Chance that the next box of a track is on another person, where it fits.")
     strained: float = param(0.1, "1", "The same where its place or size contradicts the track.")
     legs_s: float = param(1.0, "s", "Legs that are the same for this time, with nobody's near, are the same person's.")
     legs_apart: float = param(0.4, "m", "Other legs nearer than this may have changed places with them.")
     fades_s: float = param(2.0, "s", "Time constant with which an unmeasured track loses the person.")
-    shows_s: float = param(2.0, "s", "Time constant with which a lost person who is near would have a track.")
+    shows_s: float = param(2.0, "s", "Time constant with which a lost person who is near gets a track.")
     near_s: float = param(4.0, "s", "A person is near for this time after it was last sure where they are.")
     meets: float = param(0.5, "m", "Two tracks nearer than this to each other may swap their people.")
     swaps: float = param(0.2, "1/m", "Chance of a swap for each metre by which they pass each other.")
@@ -134,7 +134,7 @@ class Identity:
         stamp = tracks.stamp or 0.0
         chances = {number: chance for number, chance in known.chances if number in people}
         gone = {person.number for person in people.values() if self._is_gone(person, tracks, walking)}
-        chances = self._stayed(chances, people, tracks, walking, gone)
+        chances = self._stayed(chances, tracks, walking, gone)
         lost_s = stamp - known.at
         share = min(max(lost_s - self.unseen_s, 0.0) / self.fades_s, 1.0) / 2
         for number, person in people.items():
@@ -162,15 +162,11 @@ class Identity:
         return chances
 
     def _stayed(
-        self,
-        chances: dict[int, float],
-        people: dict[int, Person],
-        tracks: Tracks,
-        walking: AbstractSet[int],
-        gone: AbstractSet[int],
+        self, chances: dict[int, float], tracks: Tracks, walking: AbstractSet[int], gone: AbstractSet[int]
     ) -> dict[int, float]:
-        """Return the probabilities that are left on the tracks, or pass to those whose legs theirs may be."""
+        """Return what each track keeps of its probability, and gets from tracks whose legs may be its own."""
         stamp, gains = tracks.stamp or 0.0, dict.fromkeys(chances, 0.0)
+        people = {person.number: person for person in tracks.people}
         for number, chance in chances.items():
             person = people[number]
             if number in gone:

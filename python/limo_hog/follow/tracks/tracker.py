@@ -125,11 +125,11 @@ class Tracker:
 
     def _glimpsed(self, person: Person, observation: Observation, pose: Odometry) -> Person:
         """Note what a confirmed person without a box wears, where the camera shows it."""
+        if not person.confirmed:
+            return person
         bearing, distance = bearing_range(person.track, pose)
         place = distance * math.cos(bearing), distance * math.sin(bearing)
-        worn = None
-        if person.confirmed:
-            worn = self.visibility.glimpse(place, person.window, person.centre, observation, self.robot)
+        worn = self.visibility.glimpse(place, person.window, person.centre, observation, self.robot)
         return person if worn is None else replace(person, worn=worn, tall=None, glimpsed=observation.stamp)
 
     def begin(self, number: int, seen: Measurement, stamp: float, pose: Odometry) -> Person:

@@ -75,9 +75,8 @@ class Lookout:
         ahead = from_odometry(places.points, pose)
         off, far = np.arctan2(ahead[:, 1], ahead[:, 0]), np.hypot(*ahead.T)
         shown = (np.abs(off) < self.half_view) & (far < self.view) & grid.sees(ground, here, places.points)[0]
-        left = self.wandering.look(places, scan, shown, moving, pose, situation.robot) or self._anywhere(
-            hunt, situation
-        )
+        left = self.wandering.look(places, scan, shown, moving, pose, situation.robot)
+        left = left or self._anywhere(hunt, situation)
         if left is None:
             return replace(hunt, places=places, way=NO_POINTS, facing=None, planned=now)
         hunt = replace(hunt, places=left)

@@ -24,7 +24,7 @@ from limo_hog.follow.sense.region import FAR_WINDOW, Region
 from limo_hog.follow.space.grid import Grid
 from limo_hog.follow.tracks.asking import Whom, named
 from limo_hog.follow.tracks.hiding import Hiding
-from limo_hog.follow.tracks.kalman import bearing_range, predict, rates
+from limo_hog.follow.tracks.kalman import Track, bearing_range, predict, rates
 from limo_hog.follow.tracks.person import Person
 from limo_hog.follow.tracks.tracker import Tracker
 
@@ -234,13 +234,13 @@ class TrackingController:
         choice, known, scan, lookout = state.choice, state.known, observation.scan, self.lookout
         lost = choice.measured is not None
         mode = Mode.LOST if lost else Mode.SEARCH
-        if (off := self._off_unknown(situation, state)) is not None:
+        moving = self.tracker.may_be(choice.number, state.tracks, situation.now)
+        if (off := self._off_unknown(moving, situation, state)) is not None:
             return Aimed(lookout.facing(off), mode, "turning to what moves in the scan", state), Belief()
         goal, belief, reason = None, Belief(), "searching for the lost person" if lost else "searching for a person"
         young = known is not None and situation.now - known.stamp < lookout.give_up_s
         if lost and known is not None and young and scan is not None and situation.ground is not None:
             hunt = state.hunt or lookout.begin(known, choice.number or 0, situation)
-            moving = self.tracker.may_be(choice.number, state.tracks, situation.now)
             means = np.array([*map(attrgetter("mean"), moving)]).reshape(-1, 4)
             hunt = lookout.step(hunt, scan, means, situation)
             goal, reason = lookout.goal(hunt, situation, self.planner.sampling.times)
@@ -251,10 +251,9 @@ class TrackingController:
         goal = goal or Goal(0.0, rate=state.side * lookout.search_rate)
         return Aimed(goal, mode, reason, state), belief
 
-    def _off_unknown(self, situation: Situation, state: TrackingState) -> float | None:
-        """Return the bearing [rad] of what moves in the scan, where a lost person can be by now; None without any."""
+    def _off_unknown(self, tracks: list[Track], situation: Situation, state: TrackingState) -> float | None:
+        """Return the bearing [rad], nearest to ahead, of a track where a lost person can be by now; None without."""
         now, known = situation.now, state.known
-        tracks = self.tracker.may_be(state.choice.number, state.tracks, now)
         others = state.choice.likeness.others if state.choice.likeness else ()
         if others and known is not None and now - known.stamp > self.tracker.legs_only_s:
             # Among people something always moves; where the person may be is believed by then.

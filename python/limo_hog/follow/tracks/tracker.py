@@ -96,8 +96,9 @@ class Tracker:
         people, boxes, recall = list[Person](), dict[int, int](), tracks.recall
         for who, person in enumerate(known):
             bearing, distance = bearing_range(person.track, pose)
-            sizes, sure = (person.window, person.centre), person.confirmed
-            expected = self.visibility.expected(bearing, distance, *sizes, observation, confirmed=sure)
+            expected = self.visibility.expected(
+                bearing, distance, person.window, person.centre, observation, confirmed=person.confirmed
+            )
             height = person.window / max(distance, 0.3)
             chance = self.existence.recall_of(tracks.recall, height)
             if expected and person.confirmed:

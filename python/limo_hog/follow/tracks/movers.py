@@ -33,7 +33,8 @@ class Mover:
     began: tuple[float, float]  #: Where it was first, x and y in the odometry frame [m], and when [s].
     since: float
     felt: float  #: Stamp of the last scan that showed it [s].
-    left: bool = False  #: Whether that place was seen to be empty since.
+    left: bool = False  #: Whether that place was seen to be empty since, or this one before.
+    way: float = 0.0  #: How far from where it began it has been [m].
     scans: int = 1  #: How many did, and for how many of these the camera looked there and showed no person [1].
     shown: int = 0
     #: Of the person whom the camera showed there last, and since when they are theirs [s]; None if it showed none.
@@ -60,6 +61,8 @@ class Movers:
     looks: int = param(12, "1", "Scans without a person in the camera's view after which it is no more turned to.")
     beside: float = param(0.4, "m", "A person is this far from their own legs at most.")
     taken: float = param(0.35, "m", "A person must be nearer by this to other legs than to their own.")
+    bodies: float = param(0.2, "m", "Two people nearer than this, a body's width, have one group of returns,")
+    passing: float = param(0.3, "m/s", "if they pass each other by this. Two beside each other keep each their own.")
     nearer: float = param(0.15, "m", "A box is on other legs than a person's own if it is nearer to them by this.")
     robot: RobotGeometry = LIMO  #: Where the lidar sits.
 
@@ -83,32 +86,27 @@ class Movers:
         kept: list[Mover] = []
         movers, claims = self._in_turn(movers)
         expected = [kalman.predict(mover.track, returns.stamp, noise) for mover in movers]
-        gaps = all_distances(points, expected)
-        legs = {mover.stature: self.legs.of(mover.stature) for mover in movers}
-        gaps = np.where(gaps < np.array([legs[mover.stature].radius for mover in movers])[:, None], gaps, np.inf)
-        # Of known people's legs and of what has moved, the nearest has a return.
-        whose = gaps[:claims].argmin(axis=0) if claims else np.zeros(len(points), np.int64)
-        free, near = np.ones(len(points), bool), gaps < np.inf
-        for index, mover in enumerate(movers):
-            own = free & (whose == index) if index < claims else free
-            track = legs[mover.stature].corrected(expected[index], points[own & near[index]], returns.pose, noise)
+        found = self._corrected(movers, claims, expected, replace(returns, points=points), noise)
+        for mover, place, track in zip(movers, expected, found, strict=True):
             if track is not None:
-                shown = mover.shown + is_in_view(track, returns, camera, self.robot)
-                kept.append(replace(mover, track=track, felt=returns.stamp, scans=mover.scans + 1, shown=shown))
-                free &= ~own | (distances(points, track) > legs[mover.stature].radius)
+                way, shown = math.dist(track.place, mover.began), is_in_view(track, returns, camera, self.robot)
+                mover = replace(mover, track=track, felt=returns.stamp, way=max(mover.way, way))
+                kept.append(replace(mover, scans=mover.scans + 1, shown=mover.shown + shown))
                 continue
-            due = is_in_view(expected[index], returns, lidar, self.robot, self.robot.lidar_yaw)
+            due = is_in_view(place, returns, lidar, self.robot, self.robot.lidar_yaw)
             if returns.stamp - mover.felt < (self.forget_s if due else self.unseen_s):
                 kept.append(mover)
         if ground is not None and not all(map(attrgetter("left"), kept)):
             began, since = np.array([mover.began for mover in kept]), np.array([mover.since for mover in kept])
             # The map is sure only a second after a person who stood there left; a beam that passes shows it at once.
             left = grid.is_free_since(ground, began, since) | self._passed(returns, began)
+            # Somebody who comes straight here hides where they began; they are where the ground was seen to be free.
+            left |= grid.is_free_since(ground, np.array([mover.track.place for mover in kept]), since)
             kept = [replace(mover, left=True) if gone else mover for mover, gone in zip(kept, left, strict=True)]
         places = self._groups(returns)
         if ground is not None and len(places):
             places = places[~grid.is_blocked(ground, places, lasting=True)]
-        reach = np.array([legs[mover.stature].radius for mover in kept])[:, None]
+        reach = np.array([self.legs.of(mover.stature).radius for mover in kept])[:, None]
         new = (all_distances(places, [*map(attrgetter("track"), kept)]) > reach).all(axis=0)
         begun = [self._begin(place, returns, noise) for place in places[new]]
         return (*kept, *begun)
@@ -136,6 +134,9 @@ class Movers:
         others = [mover.track for mover in walking if is_felt or mover.number is not None]
         if others:
             others = [kalman.predict(other, returns.stamp, noise) for other in others]
+            if self._merged([track, *others])[0, 1:].any():
+                # Their own legs go on as they went: `continued`.
+                return person
             nearest = all_distances(returns.points, others).min(axis=0)
             returns = replace(returns, points=returns.points[distances(returns.points, track) <= nearest])
         found = self.legs.of(person.stature).update(track, returns, noise, is_ground)
@@ -206,8 +207,42 @@ class Movers:
         return replace(person, track=kalman.update(track, fit), felt=returns.stamp)
 
     def _has_moved(self, mover: Mover) -> bool:
-        way = math.dist(mover.track.place, mover.began)
-        return mover.left and mover.scans >= self.fewest_scans and way > self.least_way
+        return mover.left and mover.scans >= self.fewest_scans and mover.way > self.least_way
+
+    def _corrected(
+        self, movers: Sequence[Mover], claims: int, expected: Sequence[Track], returns: Returns, noise: Noise
+    ) -> list[Track | None]:
+        """Return the track of each mover, of which the first have `claims`, by its returns; None where it has none.
+
+        Of known people's legs and of what has moved, the nearest has a return. Those who pass through each other share
+        theirs: each is off its expected place by what all of them are, so that they go on as they went.
+        """
+        points, found = returns.points, list[Track | None]()
+        legs = [self.legs.of(mover.stature) for mover in movers]
+        gaps = all_distances(points, expected)
+        near = gaps < np.array([leg.radius for leg in legs]).reshape(-1, 1)
+        whose = np.where(near, gaps, np.inf)[:claims].argmin(axis=0) if claims else np.zeros(len(points), np.int64)
+        free, merged = np.ones(len(points), bool), self._merged(expected[:claims])
+        places = np.array([track.place for track in expected]).reshape(-1, 2)
+        for index, leg in enumerate(legs):
+            own, shift = free & near[index], np.zeros(2)
+            if index < claims:
+                own = near[index] & merged[index][whose]
+                shift = places[index] - places[:claims][merged[index]].mean(axis=0)
+            track = leg.corrected(expected[index], points[own] + shift, returns.pose, noise)
+            if track is not None:
+                free &= ~own | (distances(points, track) > leg.radius)
+            found.append(track)
+        return found
+
+    def _merged(self, tracks: Sequence[Track]) -> NDArray[np.bool_]:
+        """Return which of M tracks pass so near each other that returns cannot tell whose they are, bool (M, M)."""
+        means = np.array([track.mean for track in tracks]).reshape(-1, 4)
+        off = means[:, None] - means
+        passing = (np.hypot(off[..., 0], off[..., 1]) < self.bodies) & (
+            np.hypot(off[..., 2], off[..., 3]) > self.passing
+        )
+        return np.asarray(passing | np.eye(len(means), dtype=bool))
 
     def _in_turn(self, movers: tuple[Mover, ...]) -> tuple[tuple[Mover, ...], int]:
         """Return movers in the order in which they take returns, and how many of them have a claim to the nearest.

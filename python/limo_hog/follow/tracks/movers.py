@@ -17,7 +17,7 @@ from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import Points, lidar_at
 from limo_hog.follow.sense.measurement import STATURE, Measurement
-from limo_hog.follow.sense.observation import Mask, Odometry, turn_between
+from limo_hog.follow.sense.observation import Mask, Odometry
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.association import Legs, Returns, all_distances, distances
@@ -53,7 +53,6 @@ class Movers:
 
     legs: Legs = field(default_factory=Legs)  #: How a group, or the legs of a tracked person, are found again.
     gap: float = param(0.3, "m", "Returns further apart than this are of two groups.")
-    beams: float = param(0.03, "rad", "A beam within this passes a place.")
     fewest_scans: int = param(4, "1", "Scans after which a group counts as moving.")
     least_way: float = param(0.25, "m", "Way from where it began, from which it counts as moving.")
     forget_s: float = param(0.5, "s", "A group is given up when a scan should have shown it for this time.")
@@ -98,10 +97,9 @@ class Movers:
                 kept.append(mover)
         if ground is not None and not all(map(attrgetter("left"), kept)):
             began, since = np.array([mover.began for mover in kept]), np.array([mover.since for mover in kept])
-            # The map is sure only a second after a person who stood there left; a beam that passes shows it at once.
-            left = grid.is_free_since(ground, began, since) | self._passed(returns, began)
             # Somebody who comes straight here hides where they began; they are where the ground was seen to be free.
-            left |= grid.is_free_since(ground, np.array([mover.track.place for mover in kept]), since)
+            here = np.array([mover.track.place for mover in kept])
+            left = grid.is_free_since(ground, began, since) | grid.is_free_since(ground, here, since)
             kept = [replace(mover, left=True) if gone else mover for mover, gone in zip(kept, left, strict=True)]
         places = self._groups(returns)
         if ground is not None and len(places):
@@ -255,16 +253,6 @@ class Movers:
             if mover.number is None:
                 (claims if self._has_moved(mover) else rest).append(mover)
         return (*claims, *rest), len(claims)
-
-    def _passed(self, returns: Returns, places: Points) -> NDArray[np.bool_]:
-        """Return whether the beams nearest to each of (N, 2) places end behind it, bool (N,)."""
-        pose, points = returns.pose, returns.points
-        x, y = lidar_at(pose, self.robot)
-        ends, far = np.arctan2(points[:, 1] - y, points[:, 0] - x), np.hypot(points[:, 0] - x, points[:, 1] - y)
-        to, near = np.arctan2(places[:, 1] - y, places[:, 0] - x), np.hypot(places[:, 0] - x, places[:, 1] - y)
-        beside = turn_between(ends[None, :], to[:, None]) < self.beams
-        shortest = np.where(beside, far[None, :], np.inf).min(axis=1, initial=np.inf)
-        return np.asarray(beside.any(axis=1) & (shortest > near + self.gap))
 
     def _groups(self, returns: Returns) -> Points:
         """Return the middle of each group of returns that is as wide as legs, float64 (N, 2) [m], odometry frame.

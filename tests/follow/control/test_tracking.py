@@ -13,7 +13,6 @@ from limo_hog.follow import Decision, Mode, Observation, Odometry, Twist
 from limo_hog.follow.control.selection import TrackingState
 from limo_hog.follow.sense.clearance import NO_POINTS
 from limo_hog.follow.sense.observation import clothes_in
-from limo_hog.follow.tracks.identity import Traits
 
 
 def test_it_faces_a_new_person_at_once_and_drives_only_when_sure() -> None:
@@ -199,22 +198,6 @@ def test_before_a_person_is_found_it_turns_to_what_walks_beside_it() -> None:
     # Nothing moves where legs stand: it searches to the side it began with.
     standing = walking(World(person=(-3.0, 0.0)), CONTROLLER.start(), [(0.3, -1.8)] * 25)
     assert standing.twist.angular == CONTROLLER.lookout.search_rate
-
-
-def test_among_people_a_lost_person_is_not_taken_for_what_moves_for_long() -> None:
-    for others, turns in (((), True), ((Traits(7, None, 500.0),), False)):
-        world, state = World(person=(2.0, 0.0)), CONTROLLER.start()
-        for step in range(90):
-            legs = [(0.1 + 0.02 * step + dx, -1.6) for dx in (-0.05, 0.0, 0.05)]
-            if likeness := state.choice.likeness:
-                state = replace(state, choice=replace(state.choice, likeness=replace(likeness, others=others)))
-            points = [*legs, (1.95, 0.0), (2.05, 0.0)] if step < 20 else legs
-            decision = CONTROLLER.step(
-                replace(world.observe(visible=step < 20), scan=scan_of(points, world.time)), state
-            )
-            state = decision.state
-            world.time += world.period
-        assert (decision.reason == "turning to what moves in the scan") == turns
 
 
 def test_a_person_who_leaves_the_view_is_followed_by_the_lidar_as_long_as_they_move() -> None:

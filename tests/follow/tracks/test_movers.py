@@ -89,18 +89,49 @@ def test_what_the_camera_has_shown_for_long_is_counted() -> None:
     assert movers[0].shown == movers[0].scans - 1
 
 
-def test_a_place_is_empty_once_a_beam_ends_behind_it_and_nothing_is_nearer() -> None:
-    wall = [(3.5, 0.05 * step - 3.0) for step in range(120)]
-    post = [(0.8, 0.0), (0.8, 0.05)]
-    for nearer, moving in (([], 1), (post, 0)):
+def test_a_person_who_comes_straight_here_moves_where_the_ground_was_free() -> None:
+    # They hide where they began, which is never seen to be free; a wall that comes into view was hidden as well.
+    cells = np.arange(GRID.cells) * GRID.cell + FREE.corner[0] * GRID.cell
+    ahead = replace(FREE, freed=np.where(cells[:, None] < 2.9, FREE.freed, -np.inf))
+    for ground, moving in ((ahead, 1), (NEVER, 0)):
         movers: tuple[Mover, ...] = ()
         for index in range(10):
-            y = 0.1 * index
-            hidden = [one for one in wall if abs(one[1] - y * 3.5 / 2.0) > 0.3]
-            after = nearer if index > 1 else []
-            points = sorted([(2.0, y - 0.03), (2.0, y + 0.03), *hidden, *after], key=lambda p: p[1] / p[0])
-            movers = update(movers, index * SCAN_S, *points, ground=NEVER)
+            movers = update(movers, index * SCAN_S, *legs(3.0 - 0.1 * index, 0.0, 1.0 * index), ground=ground)
         assert len(MOVERS.moving(movers)) == moving
+
+
+def test_a_person_who_is_back_where_they_began_has_moved_all_the_same() -> None:
+    movers: tuple[Mover, ...] = ()
+    for index in range(17):
+        y = 0.08 * min(index, 16 - index)
+        movers = update(movers, index * SCAN_S, *legs(2.0, y, 1.0 * index))
+    (there,) = MOVERS.moving(movers)
+    assert math.dist(there.track.place, there.began) < 0.15
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_two_who_pass_through_each_other_keep_their_legs(side: int) -> None:
+    movers: tuple[Mover, ...] = (walker(7, 2.0, 0.0), walker(8, 2.05, -0.9 * side))
+    stands = legs(2.0, 0.0, 0.0)
+    for index in range(1, 36):
+        y = side * (0.05 * index - 0.9)
+        # One who stands before them hides them.
+        walks = [one for one in legs(2.05, y, 1.0 * index) if abs(one[1]) > 0.11]
+        movers = update(movers, 1.0 + index * SCAN_S, *stands, *walks)
+        velocities = {one.number: one.track.mean[2:] for one in movers}
+        assert math.dist(velocities[7], (0.0, 0.0)) < 0.1
+    places = {one.number: one.track.place for one in movers if one.number is not None}
+    assert math.dist(places[7], (2.0, 0.0)) < 0.2
+    assert math.dist(places[8], (2.05, y)) < 0.2
+
+
+def test_where_two_pass_through_each_other_the_returns_are_not_one_persons() -> None:
+    others = walker(8, 2.0, 0.05)
+    passing = replace(others, track=replace(others.track, mean=(2.0, 0.05, 0.0, 0.6)))
+    returns = Returns(1.0, np.array([(2.0, -0.02), (2.0, 0.02)]), Odometry())
+    followed = person(7, 2.0, 0.0, 0.9)
+    assert MOVERS.walked(followed, (passing,), returns, NOISE) == followed
+    assert MOVERS.walked(followed, (others,), returns, NOISE).felt == 1.0
 
 
 def test_what_begins_is_where_its_returns_are_wherever_the_robot_is() -> None:
@@ -146,9 +177,9 @@ def test_what_is_followed_does_not_begin_again_and_what_stands_beside_it_does() 
 
 
 def test_it_has_moved_after_half_a_second_and_a_quarter_of_a_metre() -> None:
-    one = replace(walker(None, 2.0, 0.0), began=(2.0, 0.26), scans=4)
+    one = replace(walker(None, 2.0, 0.0), way=0.26, scans=4)
     assert MOVERS.moving((one,)) == [one]
-    others = (replace(one, scans=3), replace(one, began=(2.0, 0.24)), replace(one, left=False))
+    others = (replace(one, scans=3), replace(one, way=0.24), replace(one, left=False))
     assert MOVERS.moving(others) == []
 
 
@@ -214,16 +245,3 @@ def test_a_passer_by_does_not_take_the_track_along(movers: tuple[Mover, ...], ta
     after = MOVERS.walked(followed, movers, returns, NOISE)
     assert (after.felt == 1.0) == taken
     assert (after.track.mean[1] > 0.0) == taken
-
-
-@pytest.mark.parametrize(
-    ("off", "beyond", "left"), [(0.028, 0.35, True), (-0.028, 0.35, True), (0.032, 0.35, False), (0.0, 0.25, False)]
-)
-def test_a_place_is_empty_where_the_beams_beside_it_end_three_decimetres_behind(
-    off: float, beyond: float, left: bool
-) -> None:
-    moved = replace(walker(None, 2.0, 0.9), began=(2.0, 0.0), left=False)
-    far = 2.0 - LIMO.lidar_x + beyond
-    behind = LIMO.lidar_x + far * math.cos(off), far * math.sin(off)
-    (after, *_) = update((moved,), 1.1, (2.0, 0.88), (2.0, 0.92), behind, ground=NEVER)
-    assert after.left is left

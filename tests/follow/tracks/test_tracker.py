@@ -292,7 +292,7 @@ def test_no_clothes_are_learnt_from_a_box_that_is_not_on_shirt_and_trousers() ->
 def test_legs_that_walk_continue_a_person_for_longer_than_legs_that_stand() -> None:
     for last, walks, goes_on in ((-2.9, False, True), (-3.1, False, False), (-3.1, True, True)):
         one = unseen(7, last)
-        legs = replace(walker(7, 2.0, 0.1), began=(2.0 - walks, 0.1))
+        legs = replace(walker(7, 2.0, 0.1), began=(2.0 - walks, 0.1), way=float(walks))
         scan = Returns(1.0, np.array([(2.0, 0.08), (2.0, 0.12)]), Odometry())
         tracks = Tracks((one,), scans=(scan,), stamp=1.0, movers=(replace(legs, felt=0.9),), moved_at=0.9)
         assert (TRACKER.follow_movers(tracks, (2.0, 0.5), GRID, FREE).people[0].felt == 1.0) == goes_on

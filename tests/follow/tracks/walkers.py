@@ -34,7 +34,7 @@ def person(number: int, x: float, y: float, stamp: float) -> Person:
 def walker(number: int | None, x: float, y: float) -> Mover:
     """Legs that walk, of the person of a number."""
     track = Track(1.0, (x, y, 0.0, 0.0), upper(np.diag([0.01, 0.01, 0.1, 0.1])))
-    return Mover(track, (x - 1.0, y), 0.0, 1.0, left=True, scans=9, number=number, named=0.0)
+    return Mover(track, (x - 1.0, y), 0.0, 1.0, left=True, way=1.0, scans=9, number=number, named=0.0)
 
 
 def update(

@@ -24,7 +24,7 @@ from limo_hog.follow.sense.region import FAR_WINDOW, Region
 from limo_hog.follow.space.grid import Grid
 from limo_hog.follow.tracks.asking import Whom, named
 from limo_hog.follow.tracks.hiding import Hiding
-from limo_hog.follow.tracks.kalman import Track, bearing_range, predict, rates
+from limo_hog.follow.tracks.kalman import bearing_range, predict, rates
 from limo_hog.follow.tracks.person import Person
 from limo_hog.follow.tracks.tracker import Tracker
 
@@ -235,7 +235,8 @@ class TrackingController:
         lost = choice.measured is not None
         mode = Mode.LOST if lost else Mode.SEARCH
         moving = self.tracker.may_be(choice.number, state.tracks, situation.now)
-        if (off := self._off_unknown(moving, situation, state)) is not None:
+        if known is None and moving:
+            off = min((bearing_range(track, situation.pose)[0] for track in moving), key=abs)
             return Aimed(lookout.facing(off), mode, "turning to what moves in the scan", state), Belief()
         goal, belief, reason = None, Belief(), "searching for the lost person" if lost else "searching for a person"
         young = known is not None and situation.now - known.stamp < lookout.give_up_s
@@ -250,18 +251,6 @@ class TrackingController:
             reason += ": another is in view"
         goal = goal or Goal(0.0, rate=state.side * lookout.search_rate)
         return Aimed(goal, mode, reason, state), belief
-
-    def _off_unknown(self, tracks: list[Track], situation: Situation, state: TrackingState) -> float | None:
-        """Return the bearing [rad], nearest to ahead, of a track where a lost person can be by now; None without."""
-        now, known = situation.now, state.known
-        others = state.choice.likeness.others if state.choice.likeness else ()
-        if others and known is not None and now - known.stamp > self.tracker.legs_only_s:
-            # Among people something always moves; where the person may be is believed by then.
-            return None
-        if known is not None:
-            reach = self.tracker.association.same_place + self.lookout.wandering.walk * (now - known.stamp)
-            tracks = [track for track in tracks if math.dist(track.place, known.place) < reach]
-        return min((bearing_range(track, situation.pose)[0] for track in tracks), key=abs, default=None)
 
     def _is_sure(self, person: Person, state: TrackingState) -> bool:
         """Whether a track is the person followed, and not only the likeliest of those in view."""

@@ -236,11 +236,10 @@ def leg_track(x: float) -> Track:
 
 
 def test_two_returns_within_half_a_stride_are_legs_and_a_wider_group_is_furniture() -> None:
-    legs = Legs()
-
     def found(*points: tuple[float, float], x: float = 2.0) -> bool:
         returns = Returns(1.0, np.array(points).reshape(-1, 2), Odometry())
-        return legs.update(leg_track(x), returns, NOISE) is not None
+        one = replace(person(7, x, 0.0, 0.9), track=leg_track(x))
+        return TRACKER.movers.walked(one, (), returns, NOISE).felt == 1.0
 
     assert not found((2.0, 0.0))
     assert found((2.0, 0.0), (2.0, 0.05))
@@ -257,8 +256,8 @@ def test_the_legs_of_a_person_who_walks_trail_by_a_twentieth_of_a_second() -> No
     for speed in (0.0, 0.8, -0.8):
         one = replace(leg_track(2.0), mean=(2.0, 0.0, 0.0, speed))
         trailing = -0.05 * speed
-        returns = Returns(1.0, np.array([(2.0, trailing - 0.02), (2.0, trailing + 0.02)]), Odometry())
-        corrected = legs.update(one, returns, NOISE)
+        returns = np.array([(2.0, trailing - 0.02), (2.0, trailing + 0.02)])
+        corrected = legs.corrected(one, returns, Odometry(), NOISE)
         assert corrected is not None
         assert corrected.mean == pytest.approx(one.mean, abs=1e-3)
 

@@ -8,7 +8,7 @@ frames. The lidar cannot tell a person from a chair: legs may continue a track a
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 from operator import attrgetter
@@ -18,8 +18,8 @@ import numpy as np
 from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.clearance import Points
 from limo_hog.follow.sense.measurement import STATURE, TALLEST, Measurement
-from limo_hog.follow.sense.observation import Appearance, Array, Clothes, Mask, Odometry
-from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, innovation, predict, update
+from limo_hog.follow.sense.observation import Appearance, Array, Clothes, Odometry
+from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, innovation, update
 from limo_hog.follow.tracks.person import Person, distance_to
 
 
@@ -129,16 +129,6 @@ class Legs:
         """Return the same for a person of a stature [m], up to `TALLEST`: the taller, the longer a stride."""
         times = min(max(stature, STATURE), TALLEST) / STATURE
         return replace(self, radius=times * self.radius, widest=times * self.widest, sigma=times * self.sigma)
-
-    def update(
-        self, track: Track, returns: Returns, noise: Noise, is_ground: Callable[[Points], Mask] | None = None
-    ) -> Track | None:
-        """Return the track at a scan's stamp, corrected by legs that are not on the ground known; None without any."""
-        track = predict(track, returns.stamp, noise)
-        legs = returns.points.compress(distances(returns.points, track) < self.radius, axis=0)
-        if is_ground is not None and len(legs):
-            legs = legs[~is_ground(legs)]
-        return self.corrected(track, legs, returns.pose, noise)
 
     def corrected(self, track: Track, legs: Points, pose: Odometry, noise: Noise) -> Track | None:
         """Return the track, at the scan's stamp, corrected by returns (N, 2) near it; None where these are no legs."""

@@ -130,14 +130,19 @@ class Movers:
         is_felt = any(mover.number == person.number and mover.felt > since for mover in movers)
         walking = [mover for mover in self.moving(movers, since) if mover.number != person.number]
         others = [mover.track for mover in walking if is_felt or mover.number is not None]
+        points, legs = returns.points, self.legs.of(person.stature)
+        gaps = distances(points, track)
+        own = gaps < legs.radius
         if others:
             others = [kalman.predict(other, returns.stamp, noise) for other in others]
             if self._merged([track, *others])[0, 1:].any():
                 # Their own legs go on as they went: `continued`.
                 return person
-            nearest = all_distances(returns.points, others).min(axis=0)
-            returns = replace(returns, points=returns.points[distances(returns.points, track) <= nearest])
-        found = self.legs.of(person.stature).update(track, returns, noise, is_ground)
+            own &= gaps <= all_distances(points, others).min(axis=0)
+        points = points[own]
+        if is_ground is not None and len(points):
+            points = points[~is_ground(points)]
+        found = legs.corrected(track, points, returns.pose, noise)
         return person if found is None else replace(person, track=found, felt=returns.stamp)
 
     def felt(self, movers: tuple[Mover, ...], now: float) -> Points:
@@ -148,13 +153,11 @@ class Movers:
     def assign(self, movers: tuple[Mover, ...], seen: Sequence[Person], stamp: float) -> tuple[Mover, ...]:
         """Note whose legs they are: one mover to one person found by the camera, the nearest first."""
         pairs = []
-        felt = [
-            (which, mover.track.mean[:2], mover.number) for which, mover in enumerate(movers) if mover.felt == stamp
-        ]
-        with_legs = {number for _, _, number in felt}
+        felt = [(which, mover) for which, mover in enumerate(movers) if mover.felt == stamp]
+        with_legs = {mover.number for _, mover in felt}
         for who, person in enumerate(seen):
-            for which, place, number in felt:
-                gap = math.dist(person.track.place, place)
+            for which, mover in felt:
+                gap, number = math.dist(person.track.place, mover.track.place), mover.number
                 if gap < self.beside:
                     changes = number != person.number and (number is not None or person.number in with_legs)
                     pairs.append((gap + (self.taken if changes else 0.0), who, which))

@@ -264,15 +264,11 @@ class Tracker:
             if min([math.dist(here, place) for place in places], default=math.inf) <= self.association.same_place:
                 continue
             nameless.append(track)
-            may_be_own = followed is not None and (mover.number == followed.number or self._is_near(followed, track))
-            if now - mover.felt <= lately_s and not may_be_own:
+            reach = self.association.same_place + self.walk * (now - followed.measured if followed else 0.0)
+            is_far = followed is None or math.dist(followed.track.place, here) >= reach
+            if now - mover.felt <= lately_s and is_far and (followed is None or mover.number != followed.number):
                 others.append(Other(*here, now))
         return [*people.values(), *nameless], others, own
-
-    def _is_near(self, person: Person, track: Track) -> bool:
-        """Whether what moves in the scan can be a person's legs, where they have not been measured for some time."""
-        reach = self.association.same_place + self.walk * (track.stamp - person.measured)
-        return math.dist(person.track.place, track.place) < reach
 
     def may_be(self, number: int | None, tracks: Tracks, now: float) -> list[Track]:
         """Return what moves in the scan and may be the person of a number, or one not shown yet, as of `now` [s]."""

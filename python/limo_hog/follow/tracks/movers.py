@@ -60,8 +60,8 @@ class Movers:
     looks: int = param(12, "1", "Scans without a person in the camera's view after which it is no more turned to.")
     beside: float = param(0.4, "m", "A person is this far from their own legs at most.")
     taken: float = param(0.35, "m", "A person must be nearer by this to other legs than to their own.")
-    bodies: float = param(0.2, "m", "Two people nearer than this, a body's width, have one group of returns,")
-    passing: float = param(0.3, "m/s", "if they pass each other by this. Two beside each other keep each their own.")
+    bodies: float = param(0.2, "m", "Two people who pass each other nearer than a body's width share their returns.")
+    passing: float = param(0.3, "m/s", "Two people pass each other if their velocities differ by more than this.")
     nearer: float = param(0.15, "m", "A box is on other legs than a person's own if it is nearer to them by this.")
     robot: RobotGeometry = LIMO  #: Where the lidar sits.
 
@@ -239,10 +239,8 @@ class Movers:
     def _merged(self, tracks: Sequence[Track]) -> NDArray[np.bool_]:
         """Return which of M tracks pass so near each other that returns cannot tell whose they are, bool (M, M)."""
         means = np.array([track.mean for track in tracks]).reshape(-1, 4)
-        off = means[:, None] - means
-        passing = (np.hypot(off[..., 0], off[..., 1]) < self.bodies) & (
-            np.hypot(off[..., 2], off[..., 3]) > self.passing
-        )
+        x, y, vx, vy = (means[:, None] - means).transpose(2, 0, 1)
+        passing = (np.hypot(x, y) < self.bodies) & (np.hypot(vx, vy) > self.passing)
         return np.asarray(passing | np.eye(len(means), dtype=bool))
 
     def _in_turn(self, movers: tuple[Mover, ...]) -> tuple[tuple[Mover, ...], int]:

@@ -200,6 +200,20 @@ def test_before_a_person_is_found_it_turns_to_what_walks_beside_it() -> None:
     assert standing.twist.angular == CONTROLLER.lookout.search_rate
 
 
+def test_a_lost_person_is_looked_for_where_legs_walk() -> None:
+    for side in (1, -1):
+        world, state = World(person=(2.0, 0.0)), CONTROLLER.start()
+        for step in range(60):
+            legs = [(0.1 + 0.02 * step + dx, 1.6 * side) for dx in (-0.05, 0.0, 0.05)]
+            points = [*legs, (1.95, 0.0), (2.05, 0.0)] if step < 20 else legs
+            view = replace(world.observe(visible=step < 20), scan=scan_of(points, world.time))
+            decision = CONTROLLER.step(view, state)
+            state = decision.state
+            world.time += world.period
+        assert decision.mode == Mode.LOST
+        assert decision.twist.angular * side > 0.2
+
+
 def test_a_person_who_leaves_the_view_is_followed_by_the_lidar_as_long_as_they_move() -> None:
     world, state = World(person=(2.0, 0.0)), CONTROLLER.start()
     for step in range(30):

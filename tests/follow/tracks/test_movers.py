@@ -105,8 +105,8 @@ def test_a_person_who_is_back_where_they_began_has_moved_all_the_same() -> None:
     for index in range(17):
         y = 0.08 * min(index, 16 - index)
         movers = update(movers, index * SCAN_S, *legs(2.0, y, 1.0 * index))
-    (there,) = MOVERS.moving(movers)
-    assert math.dist(there.track.place, there.began) < 0.15
+    (mover,) = MOVERS.moving(movers)
+    assert math.dist(mover.track.place, mover.began) < 0.15
 
 
 @pytest.mark.parametrize("side", [1, -1])
@@ -115,23 +115,23 @@ def test_two_who_pass_through_each_other_keep_their_legs(side: int) -> None:
     stands = legs(2.0, 0.0, 0.0)
     for index in range(1, 36):
         y = side * (0.05 * index - 0.9)
-        # One who stands before them hides them.
-        walks = [one for one in legs(2.05, y, 1.0 * index) if abs(one[1]) > 0.11]
+        # The person who stands hides what is behind them.
+        walks = [place for place in legs(2.05, y, 1.0 * index) if abs(place[1]) > 0.11]
         movers = update(movers, 1.0 + index * SCAN_S, *stands, *walks)
-        velocities = {one.number: one.track.mean[2:] for one in movers}
+        velocities = {mover.number: mover.track.mean[2:] for mover in movers}
         assert math.dist(velocities[7], (0.0, 0.0)) < 0.1
-    places = {one.number: one.track.place for one in movers if one.number is not None}
+    places = {mover.number: mover.track.place for mover in movers if mover.number is not None}
     assert math.dist(places[7], (2.0, 0.0)) < 0.2
     assert math.dist(places[8], (2.05, y)) < 0.2
 
 
 def test_where_two_pass_through_each_other_the_returns_are_not_one_persons() -> None:
-    others = walker(8, 2.0, 0.05)
-    passing = replace(others, track=replace(others.track, mean=(2.0, 0.05, 0.0, 0.6)))
+    beside = walker(8, 2.0, 0.05)
+    passing = replace(beside, track=replace(beside.track, mean=(2.0, 0.05, 0.0, 0.6)))
     returns = Returns(1.0, np.array([(2.0, -0.02), (2.0, 0.02)]), Odometry())
     followed = person(7, 2.0, 0.0, 0.9)
     assert MOVERS.walked(followed, (passing,), returns, NOISE) == followed
-    assert MOVERS.walked(followed, (others,), returns, NOISE).felt == 1.0
+    assert MOVERS.walked(followed, (beside,), returns, NOISE).felt == 1.0
 
 
 def test_what_begins_is_where_its_returns_are_wherever_the_robot_is() -> None:

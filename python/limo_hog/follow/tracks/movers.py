@@ -33,8 +33,8 @@ class Mover:
     began: tuple[float, float]  #: Where it was first, x and y in the odometry frame [m], and when [s].
     since: float
     felt: float  #: Stamp of the last scan that showed it [s].
-    left: bool = False  #: Whether that place was seen to be empty since, or this one before.
-    way: float = 0.0  #: How far from where it began it has been [m].
+    left: bool = False  #: Whether that place was seen to be empty since, or its present place before it came.
+    way: float = 0.0  #: Its greatest distance from where it began [m].
     scans: int = 1  #: How many did, and for how many of these the camera looked there and showed no person [1].
     shown: int = 0
     #: Of the person whom the camera showed there last, and since when they are theirs [s]; None if it showed none.
@@ -48,7 +48,7 @@ class Movers:
     """Follows what moves in the scan.
 
     The end of what is seen of a wall, where a corner or a person hides the rest, moves as well; what it has moved from
-    is still wall. So a group moves only when the place where it began is empty.
+    is still wall. So a group moves only when the place where it began is seen to be empty, or its place was before.
     """
 
     legs: Legs = field(default_factory=Legs)  #: How a group, or the legs of a tracked person, are found again.
@@ -85,7 +85,9 @@ class Movers:
         kept: list[Mover] = []
         movers, claims = self._in_turn(movers)
         expected = [kalman.predict(mover.track, returns.stamp, noise) for mover in movers]
-        found = self._corrected(movers, claims, expected, replace(returns, points=points), noise)
+        legs = {mover.stature: self.legs.of(mover.stature) for mover in movers}
+        strides = [legs[mover.stature] for mover in movers]
+        found = self._corrected(strides, claims, expected, replace(returns, points=points), noise)
         for mover, place, track in zip(movers, expected, found, strict=True):
             if track is not None:
                 way, shown = math.dist(track.place, mover.began), is_in_view(track, returns, camera, self.robot)
@@ -97,14 +99,14 @@ class Movers:
                 kept.append(mover)
         if ground is not None and not all(map(attrgetter("left"), kept)):
             began, since = np.array([mover.began for mover in kept]), np.array([mover.since for mover in kept])
-            # Somebody who comes straight here hides where they began; they are where the ground was seen to be free.
+            # Somebody who walks straight at the lidar hides where they began, but not the free ground that they cross.
             here = np.array([mover.track.place for mover in kept])
             left = grid.is_free_since(ground, began, since) | grid.is_free_since(ground, here, since)
             kept = [replace(mover, left=True) if gone else mover for mover, gone in zip(kept, left, strict=True)]
         places = self._groups(returns)
         if ground is not None and len(places):
             places = places[~grid.is_blocked(ground, places, lasting=True)]
-        reach = np.array([self.legs.of(mover.stature).radius for mover in kept])[:, None]
+        reach = np.array([legs[mover.stature].radius for mover in kept])[:, None]
         new = (all_distances(places, [*map(attrgetter("track"), kept)]) > reach).all(axis=0)
         begun = [self._begin(place, returns, noise) for place in places[new]]
         return (*kept, *begun)
@@ -211,15 +213,14 @@ class Movers:
         return mover.left and mover.scans >= self.fewest_scans and mover.way > self.least_way
 
     def _corrected(
-        self, movers: Sequence[Mover], claims: int, expected: Sequence[Track], returns: Returns, noise: Noise
+        self, legs: Sequence[Legs], claims: int, expected: Sequence[Track], returns: Returns, noise: Noise
     ) -> list[Track | None]:
-        """Return the track of each mover, of which the first have `claims`, by its returns; None where it has none.
+        """Return each expected track, corrected by its own returns; None where it has none.
 
-        Of known people's legs and of what has moved, the nearest has a return. Those who pass through each other share
-        theirs: each is off its expected place by what all of them are, so that they go on as they went.
+        Of the first `claims` tracks, known people's legs and what has moved, the nearest has a return. Two who pass
+        through each other share their returns: both are moved by the error of their middle, and keep their velocities.
         """
         points, found = returns.points, list[Track | None]()
-        legs = [self.legs.of(mover.stature) for mover in movers]
         gaps = all_distances(points, expected)
         near = gaps < np.array([leg.radius for leg in legs]).reshape(-1, 1)
         whose = np.where(near, gaps, np.inf)[:claims].argmin(axis=0) if claims else np.zeros(len(points), np.int64)

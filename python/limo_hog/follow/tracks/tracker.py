@@ -255,6 +255,7 @@ class Tracker:
                 if person is not followed and now - person.measured <= lately_s:
                     others.append(Other(*track.place, now, person.clothes))
         own = None if followed is None else people.get(followed.number)
+        reach = self.association.same_place + (self.walk * (now - followed.measured) if followed else 0.0)
         places, nameless = [*map(attrgetter("place"), people.values())], []
         for mover in self.movers.moving(tracks.movers):
             if mover.number in people:
@@ -264,9 +265,10 @@ class Tracker:
             if min([math.dist(here, place) for place in places], default=math.inf) <= self.association.same_place:
                 continue
             nameless.append(track)
-            reach = self.association.same_place + self.walk * (now - followed.measured if followed else 0.0)
-            is_far = followed is None or math.dist(followed.track.place, here) >= reach
-            if now - mover.felt <= lately_s and is_far and (followed is None or mover.number != followed.number):
+            may_be_own = followed is not None and (
+                mover.number == followed.number or math.dist(followed.track.place, here) < reach
+            )
+            if now - mover.felt <= lately_s and not may_be_own:
                 others.append(Other(*here, now))
         return [*people.values(), *nameless], others, own
 

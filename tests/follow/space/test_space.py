@@ -167,13 +167,14 @@ def test_a_person_walks_on_where_they_went_and_not_through_walls() -> None:
 
 def test_no_person_is_where_beams_pass_which_begin_where_the_robots_lidar_is() -> None:
     points = at((1.0, 0.5), (1.75, 0.5), (1.9, 0.5), (2.5, 0.5), (3.0, -2.0), (-1.0, 0.0))
-    passed = WANDERING.looked_through(points, wall_scan(), HERE, LIMO)
+    passed, hidden = WANDERING.beams_to(points, wall_scan(), HERE, LIMO)
     assert passed.tolist() == [True, True, False, False, True, False]
+    assert hidden.tolist() == [False, False, False, True, False, False]
     # A lidar .6 m further ahead measures the same ranges of a wall that is .6 m further away.
     points = at((1.75, 0.5), (2.35, 0.5))
     for ahead, passes in ((0.0, [True, False]), (0.6, [True, True])):
         robot = replace(LIMO, lidar_x=LIMO.lidar_x + ahead)
-        assert WANDERING.looked_through(points, wall_scan(), HERE, robot).tolist() == passes
+        assert WANDERING.beams_to(points, wall_scan(), HERE, robot)[0].tolist() == passes
 
 
 def test_what_is_seen_to_be_empty_leaves_the_other_places() -> None:

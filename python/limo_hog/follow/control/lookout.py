@@ -80,7 +80,7 @@ class Lookout:
         if left is None:
             return replace(hunt, places=places, way=NO_POINTS, facing=None, planned=now)
         hunt = replace(hunt, places=left)
-        return hunt if now - hunt.planned < self.replan_s else self._plan(hunt, situation)
+        return hunt if now - hunt.planned < self.replan_s else self._plan(hunt, scan, situation)
 
     def goal(self, hunt: Hunt, situation: Situation, times: Points) -> tuple[Goal | None, str]:
         """Return the goal of a rollout whose steps end at `times` [s], and the reason; None to turn on and on."""
@@ -103,7 +103,7 @@ class Lookout:
         moved = (from_odometry(points, situation.pose).tolist() for points in (hunt.places.points, hunt.way))
         return tuple(tuple((x, y) for x, y in points) for points in moved)
 
-    def _plan(self, hunt: Hunt, situation: Situation) -> Hunt:
+    def _plan(self, hunt: Hunt, scan: Scan, situation: Situation) -> Hunt:
         now, pose, grid, ground = situation.now, situation.pose, situation.grid, situation.mapped
         routes = self.router.field(grid, ground, pose)
         cells = np.argwhere(np.isfinite(routes))
@@ -114,6 +114,8 @@ class Lookout:
         points = hunt.places.points[:: max(len(hunt.places.points) // 50, 1)]
         dx, dy = (points[None, :] - origins[:, None]).transpose(2, 0, 1)
         seen = (np.hypot(dx, dy) < self.view) & grid.sees(ground, origins, points)
+        # From here, not what somebody stands before.
+        seen[0] &= ~self.wandering.beams_to(points, scan, pose, situation.robot)[1]
         faced = np.linspace(-math.pi, math.pi, self.directions, endpoint=False)
         shown = seen[:, None] & (turn_between(np.arctan2(dy, dx)[:, None], faced[:, None]) < self.half_view)
         share = shown.mean(axis=2)

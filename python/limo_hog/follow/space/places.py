@@ -81,12 +81,12 @@ class Wandering:
         """Remove places where the person was not found, in favour of the others; None where no place is left.
 
         Nobody is where the beams of the newest scan, taken at `pose`, pass; `shown`, bool (N,), are the places that the
-        camera shows, without a person in them. A person who is not there may be what moves nearest to there in the
-        scan: `moving`, float64 (M, 4), x, y, vx, vy.
+        camera shows, without a person in them, unless somebody stands before them. A person who is not there may be
+        what moves nearest to there in the scan: `moving`, float64 (M, 4), x, y, vx, vy.
         """
         random = np.random.default_rng([places.seed, 2])
-        kept = ~self.looked_through(places.points, scan, pose, robot)
-        kept &= ~shown | (random.random(len(shown)) > self.found)
+        passed, hidden = self.beams_to(places.points, scan, pose, robot)
+        kept = ~passed & (~shown | hidden | (random.random(len(shown)) > self.found))
         if kept.all():
             return places
         points, velocities = places.points.copy(), places.velocities.copy()
@@ -101,19 +101,18 @@ class Wandering:
         chosen = np.concatenate([left, left[random.integers(len(left), size=(~kept).sum())]])
         return Places(places.stamp, points[chosen], velocities[chosen], places.seed)
 
-    def looked_through(self, points: Points, scan: Scan, pose: Odometry, robot: RobotGeometry) -> Mask:
-        """Return for each point, bool (N,), whether all beams near it pass."""
+    def beams_to(self, points: Points, scan: Scan, pose: Odometry, robot: RobotGeometry) -> tuple[Mask, Mask]:
+        """Return for each point, bool (N,) each, whether all beams near it pass, and whether one ends before it."""
         x, y = lidar_at(pose, robot)
         dx, dy = points[:, 0] - x, points[:, 1] - y
         distance = np.maximum(np.hypot(dx, dy), 0.05)
         angle = np.remainder(np.arctan2(dy, dx) - pose.yaw + math.pi, math.tau) - math.pi
-        step = (scan.angle_max - scan.angle_min) / max(len(scan.ranges) - 1, 1)
-        beam = beams_at(angle, scan.angle_min, scan.angle_max, len(scan.ranges)).astype(np.int64)
+        count, offsets = len(scan.ranges), np.arange(-20, 21)
+        step = (scan.angle_max - scan.angle_min) / max(count - 1, 1)
+        beam = beams_at(angle, scan.angle_min, scan.angle_max, count).astype(np.int64)
         half = np.minimum(np.ceil(np.arctan(self.width / 2 / distance) / step), 20).astype(np.int64)
-        passes = (beam - half >= 0) & (beam + half < len(scan.ranges)) & (distance < self.far)
-        ranges = np.where(np.isnan(scan.ranges), 0.0, scan.ranges).astype(np.float64)
-        offsets = np.arange(-20, 21)
-        near = np.abs(offsets)[None, :] <= half[:, None]
-        around = ranges[np.clip(beam[:, None] + offsets[None, :], 0, len(ranges) - 1)]
-        least = np.where(near, around, np.inf).min(axis=1)
-        return np.asarray(passes & (least > distance + self.body))
+        inside = (beam - half >= 0) & (beam + half < count)
+        near = np.abs(offsets) <= half[:, None]
+        around = np.where(near, scan.ranges[np.clip(beam[:, None] + offsets, 0, count - 1)], np.inf)
+        passes = inside & (distance < self.far) & (around > distance[:, None] + self.body).all(axis=1)
+        return passes, inside & (around < distance[:, None] - self.body).any(axis=1)

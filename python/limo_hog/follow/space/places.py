@@ -103,8 +103,7 @@ class Wandering:
 
     def beams_to(self, points: Points, scan: Scan, pose: Odometry, robot: RobotGeometry) -> tuple[Mask, Mask]:
         """Return for each point, bool (N,) each, whether all beams near it pass, and whether one ends before it."""
-        x, y = lidar_at(pose, robot)
-        dx, dy = points[:, 0] - x, points[:, 1] - y
+        dx, dy = (points - lidar_at(pose, robot)).T
         distance = np.maximum(np.hypot(dx, dy), 0.05)
         angle = np.remainder(np.arctan2(dy, dx) - pose.yaw + math.pi, math.tau) - math.pi
         count, offsets = len(scan.ranges), np.arange(-20, 21)
@@ -113,6 +112,6 @@ class Wandering:
         half = np.minimum(np.ceil(np.arctan(self.width / 2 / distance) / step), 20).astype(np.int64)
         inside = (beam - half >= 0) & (beam + half < count)
         near = np.abs(offsets) <= half[:, None]
-        around = np.where(near, scan.ranges[np.clip(beam[:, None] + offsets, 0, count - 1)], np.inf)
-        passes = inside & (distance < self.far) & (around > distance[:, None] + self.body).all(axis=1)
-        return passes, inside & (around < distance[:, None] - self.body).any(axis=1)
+        beyond = np.where(near, scan.ranges[np.clip(beam[:, None] + offsets, 0, count - 1)], np.inf) - distance[:, None]
+        passed = inside & (distance < self.far) & (beyond > self.body).all(axis=1)
+        return passed, inside & (beyond < -self.body).any(axis=1)

@@ -114,7 +114,7 @@ class Lookout:
         points = hunt.places.points[:: max(len(hunt.places.points) // 50, 1)]
         dx, dy = (points[None, :] - origins[:, None]).transpose(2, 0, 1)
         seen = (np.hypot(dx, dy) < self.view) & grid.sees(ground, origins, points)
-        # From here, not what somebody stands before.
+        # What somebody stands before is not seen from here.
         seen[0] &= ~self.wandering.beams_to(points, scan, pose, situation.robot)[1]
         faced = np.linspace(-math.pi, math.pi, self.directions, endpoint=False)
         shown = seen[:, None] & (turn_between(np.arctan2(dy, dx)[:, None], faced[:, None]) < self.half_view)

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from tests.follow.estimates import upper
-from tests.follow.views import scan, there
+from tests.follow.views import scan, scan_of, there
 
 from limo_hog.follow.control.lookout import Hunt, Lookout
 from limo_hog.follow.control.situation import Goal, Situation
 from limo_hog.follow.robot import LIMO, Twist
 from limo_hog.follow.sense.clearance import NO_POINTS, Points
-from limo_hog.follow.sense.observation import Odometry, Scan
+from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.space.places import Places, Wandering
 from limo_hog.follow.tracks import kalman
@@ -57,23 +57,20 @@ def test_no_person_is_where_the_camera_shows_none() -> None:
     np.testing.assert_array_equal(np.unique(after.places.points, axis=0), np.unique(around[~shown], axis=0))
 
 
-def somebody_ahead() -> Scan:
-    """A scan of somebody who stands a metre ahead."""
-    free = scan(stamp=NOW)
-    angles = np.linspace(free.angle_min, free.angle_max, len(free.ranges))
-    return replace(free, ranges=np.where(np.abs(angles) < 0.2, 1.0, free.ranges).astype(np.float32))
+#: A scan of somebody who stands a metre ahead.
+SOMEBODY_AHEAD = scan_of([(1.0, 0.05 * step) for step in range(-3, 4)], NOW)
 
 
 def test_the_camera_does_not_show_who_stands_behind_another() -> None:
     sure = Lookout(wandering=Wandering(found=1.0))
     behind, beside = (4.5, 0.0), (4.5, 1.5)
-    after = sure.step(hunt_for(np.array([behind, beside]), NOW), somebody_ahead(), NOTHING, situated(free_ground()))
+    after = sure.step(hunt_for(np.array([behind, beside]), NOW), SOMEBODY_AHEAD, NOTHING, situated(free_ground()))
     assert np.unique(after.places.points, axis=0).tolist() == [list(behind)]
 
 
 def test_whoever_may_be_behind_another_is_looked_for_from_elsewhere() -> None:
     hunt = hunt_for(np.array([(4.5, 0.0)] * 10), -math.inf)
-    for seen, drives in ((BLIND, False), (somebody_ahead(), True)):
+    for seen, drives in ((BLIND, False), (SOMEBODY_AHEAD, True)):
         assert (len(LOOKOUT.step(hunt, seen, NOTHING, situated(free_ground())).way) > 0) == drives
 
 

@@ -37,9 +37,9 @@ class Wandering:
     stays: float = param(0.2, "1", "Share of the particles that stand at the beginning.")
     turn: float = param(0.8, "rad/√s", "Square root of the spectral density of the heading.")
     change_s: float = param(6.0, "s", "Mean time after which a person stands still or sets out.")
-    body: float = param(0.2, "m", "A beam that reaches further than a particle by this has looked through it.")
-    width: float = param(0.3, "m", "A person is looked through if all beams in this width pass.")
-    far: float = param(4.0, "m", "Beams do not tell further away.")
+    body: float = param(0.2, "m", "A beam passes a particle, or ends before it, if its range differs by more.")
+    width: float = param(0.3, "m", "The beams within this width tell whether a person is there, or hidden.")
+    far: float = param(4.0, "m", "Beams that pass do not tell further away.")
     found: float = param(0.15, "1", "Chance that the camera finds a person in one frame who is not hidden.")
 
     def start(self, stamp: float, mean: tuple[float, ...], covariance: Array, seed: int) -> Places:
@@ -81,7 +81,7 @@ class Wandering:
         """Remove places where the person was not found, in favour of the others; None where no place is left.
 
         Nobody is where the beams of the newest scan, taken at `pose`, pass; `shown`, bool (N,), are the places that the
-        camera shows, without a person in them, unless somebody stands before them. A person who is not there may be
+        camera shows, without a person in them, unless something nearer hides them. A person who is not there may be
         what moves nearest to there in the scan: `moving`, float64 (M, 4), x, y, vx, vy.
         """
         random = np.random.default_rng([places.seed, 2])
@@ -105,10 +105,9 @@ class Wandering:
         """Return for each point, bool (N,) each, whether all beams near it pass, and whether one ends before it."""
         dx, dy = (points - lidar_at(pose, robot)).T
         distance = np.maximum(np.hypot(dx, dy), 0.05)
-        angle = np.remainder(np.arctan2(dy, dx) - pose.yaw + math.pi, math.tau) - math.pi
         count, offsets = len(scan.ranges), np.arange(-20, 21)
         step = (scan.angle_max - scan.angle_min) / max(count - 1, 1)
-        beam = beams_at(angle, scan.angle_min, scan.angle_max, count).astype(np.int64)
+        beam = beams_at(np.arctan2(dy, dx) - pose.yaw, scan.angle_min, scan.angle_max, count).astype(np.int64)
         half = np.minimum(np.ceil(np.arctan(self.width / 2 / distance) / step), 20).astype(np.int64)
         inside = (beam - half >= 0) & (beam + half < count)
         near = np.abs(offsets) <= half[:, None]

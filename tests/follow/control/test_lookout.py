@@ -124,9 +124,10 @@ def test_a_way_ends_two_cells_before_its_last_point() -> None:
     drives, reason = goal([(0.0, 0.0), (0.21, 0.0)])
     assert (there(drives).speed, reason) == (LOOKOUT.speed, "looking round for the lost person")
     assert goal([(0.0, 0.0), (0.19, 0.0)]) == (None, "searching for the lost person")
-    for facing, off in (((0.0, 1.0), LOOKOUT.glance), ((1.0, -0.1), -math.atan(0.1))):
+    for facing, off in (((-1.0, 0.1), math.pi - math.atan(0.1)), ((1.0, -0.1), -math.atan(0.1))):
         turns, reason = goal([(0.1, 0.0)], facing)
         assert there(turns).heading == pytest.approx(off)
+        assert there(turns).turn_limit == LOOKOUT.facing_rate
         assert (there(turns).places, reason) == (None, "turning to where the lost person may be")
 
 

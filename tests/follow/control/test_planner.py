@@ -194,6 +194,22 @@ def test_people_who_would_be_met_in_two_seconds_hardly_count() -> None:
     assert plan.twist.linear > 0.3
 
 
+@pytest.mark.parametrize("heading", [2.8, -1.4, 0.6])
+def test_what_is_to_be_faced_is_turned_to_no_faster_than_asked_in_mind_too(heading: float) -> None:
+    goal = Goal(heading, turn_limit=1.2)
+    assert abs(PLANNER.plan(situation(), goal, DIRECT).twist.angular) <= 1.2
+    yaws = PLANNER.sampling.roll_out(situation(), goal, DIRECT).poses[0, :, 2]
+    assert np.abs(np.diff(yaws, prepend=0.0)).max() <= 1.2 * PLANNER.sampling.step_s
+    assert abs(yaws[-1]) > 0.8 * min(abs(heading), 1.2 * TIMES[-1] / 2)
+
+
+def test_where_to_look_is_in_view_whichever_way_round_the_robot_came_there() -> None:
+    rollouts = PLANNER.sampling.roll_out(situation(), Goal(-3.0), DIRECT)
+    poses = rollouts.poses.copy()
+    poses[:, :, 2] = math.tau - 3.0
+    assert PLANNER.in_view.cost(replace(rollouts, poses=poses), situation()) == pytest.approx(0.0)
+
+
 def test_in_mind_the_robot_brakes_no_faster_than_its_wheels_can() -> None:
     seen = situation(points=wall(0.6, half=0.6), speed=0.8)
     rollouts = PLANNER.sampling.roll_out(seen, towards(3.0), DIRECT)

@@ -35,7 +35,9 @@ class Lookout:
 
     after_s: float = param(0.8, "s", "Somebody not measured for this time is looked for, behind a wall.", 0, 30)
     speed: float = param(0.6, "m/s", "Highest speed on the way.", 0, 1)
-    glance: float = param(0.48, "rad", "Larger turns are no faster: the detector needs sharp frames.", 0, 3)
+    facing_rate: float = param(
+        1.2, "rad/s", "Highest turn rate towards a place: the detector needs sharp frames.", 0, 3
+    )
     search_rate: float = param(0.7, "rad/s", "Turn rate while nothing is known of the person.", 0, 3)
     ahead: float = param(0.5, "m", "The point of the way that is faced is this far off.")
     arrived: float = param(0.2, "m", "A way ends this near to its last point.")
@@ -96,7 +98,7 @@ class Lookout:
 
     def facing(self, off: float) -> Goal:
         """Return the goal to face what is `off` straight ahead [rad]."""
-        return Goal(min(max(off, -self.glance), self.glance))
+        return Goal(off, turn_limit=self.facing_rate)
 
     def ways(self, hunt: Hunt, situation: Situation) -> tuple[tuple[tuple[float, float], ...], ...]:
         """Return the places and the way in the base frame [m], for those who watch."""

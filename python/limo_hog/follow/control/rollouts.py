@@ -115,7 +115,9 @@ class Sampling:
         """Return what is left to turn, and the yaw, after each step, float64 (K, T) [rad]."""
         headings, own = (goal.heading + offs)[:, None], (offs == 0)[:, None]
         most = turn_acceleration(situation.acceleration, situation.robot)
-        gain = np.minimum(self.turn_gain, np.sqrt(most / np.maximum(np.abs(headings), 1e-3)))
+        far = np.maximum(np.abs(headings), 1e-3)
+        # A critically damped turn is fastest after 1 / gain: by the angle times the gain, over e.
+        gain = np.minimum(np.minimum(self.turn_gain, np.sqrt(most / far)), math.e * goal.turn_limit / far)
         rate, moved = np.where(own, goal.rate, 0.0), np.where(own, goal.rate, 0.0) * self.times
         if goal.places is not None:
             bearings = np.arctan2(goal.places[:, 1], goal.places[:, 0])

@@ -91,4 +91,5 @@ class Goal:
     #: float64 (T, 2) [m]: the place to be near, after each step of a rollout; None to drive nowhere.
     places: Points | None = None
     keeps: float = 0.0  #: The distance to hold from it, from the robot's centre [m].
+    turn_limit: float = math.inf  #: Highest turn rate [rad/s].
     faces: bool = True  #: Whether it matters that the person followed stays in the image.

@@ -27,7 +27,7 @@ class FollowedInView:
         if not goal.faces:
             return np.zeros(len(rollouts.offs))
         if situation.followed is None:
-            off = rollouts.poses[:, :, 2] - goal.heading - goal.rate * times
+            off = turn_between(rollouts.poses[:, :, 2], goal.heading + goal.rate * times)
         else:
             to = rollouts.places[:, situation.followed] - rollouts.poses[:, :, :2]
             off = turn_between(np.arctan2(to[..., 1], to[..., 0]), rollouts.poses[:, :, 2])

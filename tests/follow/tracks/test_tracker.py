@@ -242,7 +242,8 @@ def test_returns_within_half_a_stride_are_legs_and_a_wider_group_is_furniture() 
         return TRACKER.movers.walked(one, (), returns, NOISE).felt == 1.0
 
     assert not found()
-    assert found((2.0, 0.0))
+    assert not found((3.4, 0.0), x=3.4)
+    assert found((3.6, 0.0), x=3.6)
     assert found((2.0, 0.0), (2.0, 0.05))
     assert found((2.0, 0.34), (2.0, 0.33))
     assert not found((2.0, 0.36), (2.0, 0.37))

@@ -35,9 +35,7 @@ class Lookout:
 
     after_s: float = param(0.8, "s", "Somebody not measured for this time is looked for, behind a wall.", 0, 30)
     speed: float = param(0.6, "m/s", "Highest speed on the way.", 0, 1)
-    facing_rate: float = param(
-        1.2, "rad/s", "Highest turn rate towards a place: the detector needs sharp frames.", 0, 3
-    )
+    facing_rate: float = param(1.2, "rad/s", "Highest turn rate to a place: the detector needs sharp frames.", 0, 3)
     search_rate: float = param(0.7, "rad/s", "Turn rate while nothing is known of the person.", 0, 3)
     ahead: float = param(0.5, "m", "The point of the way that is faced is this far off.")
     arrived: float = param(0.2, "m", "A way ends this near to its last point.")

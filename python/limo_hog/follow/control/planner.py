@@ -101,9 +101,8 @@ class Planner:
         reason = next((words for name, words in REASONS.items() if 4 * gained.get(name, 0.0) > gains.sum()), "")
         off, speed = float(rollouts.offs[best]), float(rollouts.wanted[best])
         heading, rate = goal.heading + off, goal.rate if off == 0 else 0.0
-        limit = min(
-            stoppable_turn(heading, situation.acceleration, situation.robot) + abs(rate), self.max_turn, goal.turn_limit
-        )
+        stoppable = stoppable_turn(heading, situation.acceleration, situation.robot)
+        limit = min(stoppable + abs(rate), self.max_turn, goal.turn_limit)
         angular = min(max(self.turn_gain * heading + rate, -limit), limit)
         # Driving sideways to the person would lose sight of them: turn first, then drive.
         twist = Twist(speed * max(math.cos(heading), 0.0) ** 2, angular)

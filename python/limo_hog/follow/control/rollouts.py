@@ -115,8 +115,7 @@ class Sampling:
         """Return what is left to turn, and the yaw, after each step, float64 (K, T) [rad]."""
         headings, own = (goal.heading + offs)[:, None], (offs == 0)[:, None]
         most = turn_acceleration(situation.acceleration, situation.robot)
-        far = np.maximum(np.abs(headings), 1e-3)
-        # A critically damped turn is fastest after 1 / gain: by the angle times the gain, over e.
+        far = np.maximum(np.abs(headings), 1e-3)  # A critically damped turn is no faster than far * gain / e.
         gain = np.minimum(np.minimum(self.turn_gain, np.sqrt(most / far)), math.e * goal.turn_limit / far)
         rate, moved = np.where(own, goal.rate, 0.0), np.where(own, goal.rate, 0.0) * self.times
         if goal.places is not None:

@@ -121,6 +121,7 @@ class Legs:
     radius: float = param(0.35, "m", "Returns nearer than this to the predicted position are taken for legs.")
     widest: float = param(0.55, "m", "A wider group is a wall or a piece of furniture.")
     reach: float = param(6.5, "m", "Further away legs are not looked for: there the beams may pass beside both shins.")
+    sparse: float = param(3.5, "m", "Nearer than this legs have two returns: one may be the end of something else.")
     sigma: float = param(0.1, "m", "Standard deviation of the middle of two walking legs from the person's axis.")
     trail_s: float = param(0.05, "s", "The middle of the legs is where the person was so long ago.")
 
@@ -133,10 +134,9 @@ class Legs:
         """Return the track, at the scan's stamp, corrected by returns (N, 2) near it; None where these are no legs."""
         x, y, vx, vy = track.mean
         distance = math.hypot(x - pose.x, y - pose.y)
-        if len(legs) == 0 or distance > self.reach:
+        if len(legs) < (2 if distance < self.sparse else 1) or distance > self.reach:
             return None
-        # Of a few points, lists are faster than arrays.
-        xs, ys = legs.T.tolist()
+        xs, ys = legs.T.tolist()  # Of a few points, lists are faster than arrays.
         if math.hypot(max(xs) - min(xs), max(ys) - min(ys)) > self.widest:
             return None
         dx = sum(xs) / len(xs) + self.trail_s * vx - pose.x

@@ -272,7 +272,7 @@ class Movers:
         here, last = returns.pose, first + count - 1
         far = np.hypot(x - here.x, y - here.y)
         begun, ended = far[first[1:]], far[last[:-1]]
-        legs = np.ones(len(first), bool)
+        legs = (count > 1) | (far[first] >= self.legs.sparse)
         legs[1:] &= ended >= begun
         legs[:-1] &= begun >= ended
         extent = np.maximum.reduceat(points, first) - np.minimum.reduceat(points, first)

@@ -31,5 +31,5 @@ class FollowedInView:
         else:
             to = rollouts.places[:, situation.followed] - rollouts.poses[:, :, :2]
             off = turn_between(np.arctan2(to[..., 1], to[..., 0]), rollouts.poses[:, :, 2])
-        off = np.minimum(np.abs(off), self.most)
+        off = np.minimum(off, self.most)
         return np.asarray((self.share * off + np.maximum(off - self.edge, 0.0)).mean(axis=1))

@@ -84,7 +84,25 @@ def test_it_backs_slowly_where_somebody_out_of_sight_can_have_come() -> None:
         seen = replace(seen, ground=replace(ground, freed=ground.freed - seen_s_ago))
         return float(PLANNER.sampling.roll_out(seen, Goal(0.0), DIRECT).wanted.min())
 
-    assert (backs(1.5, -1.0), backs(0.5, -1.0), backs(1.5, -4.0)) == (-0.2, -0.6, -0.6)
+    assert (backs(1.5, -1.0), backs(0.5, -1.0), backs(1.5, -4.0)) == (-0.2, -0.3, -0.3)
+
+
+def test_only_alone_with_the_person_followed_it_backs_at_full_speed() -> None:
+    def backs(*people: tuple[float, float, float, float], followed: int | None) -> float:
+        seen = situation(*people, followed=followed, speed=-0.6)
+        return float(PLANNER.sampling.roll_out(seen, Goal(0.0), DIRECT).wanted.min())
+
+    comes, stands = (1.0, 0.0, -0.8, 0.0), (3.0, 2.0, 0.0, 0.0)
+    assert [backs(followed=None), backs(comes, followed=0), backs(comes, stands, followed=0)] == [-0.6, -0.6, -0.3]
+    assert backs(stands, followed=None) == -0.3
+
+
+def test_from_the_person_followed_who_comes_up_it_backs_without_turning_its_camera_off_them() -> None:
+    comes = (1.6, 0.2, -0.5, 0.0)
+    places = PLANNER.sampling.walked(np.array([comes]))[:, 0]
+    goal = Goal(math.atan2(0.2, 1.6), speed=-0.5, speed_later=-0.5, places=places, keeps=1.6)
+    plan = PLANNER.plan(situation(comes, (3.0, 2.0, 0.0, 0.0), followed=0), goal, DIRECT)
+    assert (plan.manoeuvre.heading, plan.twist.linear) == (None, pytest.approx(-0.3, abs=0.01))
 
 
 def goal_distance(planner: Planner) -> bool:
@@ -126,8 +144,8 @@ def unseen_ground(planner: Planner) -> bool:
 
 def effort(planner: Planner) -> bool:
     """Of the ways out of a person's way that are as good it takes the smaller turn."""
-    seen = situation((1.4, 0.0, -0.8, 0.0), points=BEHIND)
-    return abs(planner.plan(seen, Goal(0.0), DIRECT).manoeuvre.heading or 0.0) < 1.5
+    seen = situation((1.4, 0.0, -0.8, 0.0))
+    return abs(planner.plan(seen, Goal(0.0), DIRECT).manoeuvre.heading or 0.0) < 0.3
 
 
 def change_of_mind(planner: Planner) -> bool:

@@ -44,7 +44,7 @@ class Aimed(NamedTuple):
 class Following:
     """Keeps a distance that lets the camera show the whole person and lets the robot turn aside in time."""
 
-    max_speed: float = param(0.8, "m/s", "Limit of the speed, either way.", 0, 1)
+    max_speed: float = param(0.9, "m/s", "Limit of the speed, either way.", 0, 1)
     distance_tolerance: float = param(0.08, "m", "Smaller errors of distance are not corrected.", 0, 1)
     bearing_tolerance: float = param(0.02, "rad", "Smaller errors of direction are not corrected.", 0, 0.5)
     steady_bearing_rate: float = param(0.05, "rad/s", "A person whose bearing changes more slowly stands.", 0, 1)

@@ -57,6 +57,7 @@ class Sampling:
     turn_gain: float = param(4.0, "1/s", "Rate at which an error of direction decays, with strong wheels.", 0.1, 20)
     margin: Margin = field(default_factory=lambda: Margin(0.62, 0.22))
     blind_speed: float = param(0.2, "m/s", "Highest speed backwards onto ground that is not known.", 0, 1)
+    company_speed: float = param(0.3, "m/s", "Highest speed backwards while other people are about.", 0, 1)
     fresh_s: float = param(1.0, "s", "How long nobody can have come to ground seen free, to back at full speed.", 0, 60)
 
     times: Array = field(init=False, repr=False, compare=False)  #: When the steps end, float64 (T,) [s].
@@ -71,7 +72,8 @@ class Sampling:
         own = goal.speed_later + (goal.speed - goal.speed_later) * np.exp(-self.gain * self.times)
         target = np.where(np.isnan(wanted)[:, None], own, wanted[:, None])
         known, _ = situation.is_known_behind(np.zeros(3), self.fresh_s)
-        least = (-math.inf if known else -self.blind_speed) if situation.robot.may_back else 0.0
+        slow = math.inf if situation.is_alone else self.company_speed
+        least = -(slow if known else self.blind_speed) if situation.robot.may_back else 0.0
         target = np.maximum(target, least) * np.maximum(np.cos(left), 0.0) ** 2
         reach = situation.acceleration * self.times
         speed = np.clip(target, situation.driven.linear - reach, situation.driven.linear + reach)

@@ -44,6 +44,11 @@ class Situation:
             raise ValueError("there is no map yet: ask for `ground`")
         return self.ground
 
+    @property
+    def is_alone(self) -> bool:
+        """Whether nobody but the person followed is known to be about."""
+        return len(self.people) == (self.followed is not None) and not len(self.hiding)
+
     def is_known_behind(self, poses: Array, fresh_s: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Return whether ground behind poses (..., 3) was seen free, and if somebody can be where not, bool (...).
 

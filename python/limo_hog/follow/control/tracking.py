@@ -189,9 +189,8 @@ class TrackingController:
             patience = self.lookout.after_s
         if lost_s > patience:
             return self._search(situation, observation, state)
-        least = 0.0
+        least, visibility = 0.0, self.tracker.visibility
         if person.confirmed:
-            visibility = self.tracker.visibility
             least = visibility.least_distance(person.window, person.centre, observation.height) - self.robot.camera_x
         soon = predict(person.track, now + following.foresight_s, self.tracker.noise).place
         keeps = following.keeps(self.target_distance, least, brisk if person.confirmed else 0.0, soon, situation)

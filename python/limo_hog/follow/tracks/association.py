@@ -149,13 +149,7 @@ class Legs:
         return replace(noise, bearing=self.sigma / max(distance, 0.3), range=self.sigma).turning(pose.angular)
 
 
-def distances(points: Points, track: Track) -> Array:
-    """Return the distance from a track to each of (N, 2) points, odometry frame, float64 (N,) [m]."""
-    x, y, _, _ = track.mean
-    return np.asarray(np.hypot(points[:, 0] - x, points[:, 1] - y))
-
-
-def all_distances(points: Points, tracks: Sequence[Track]) -> Array:
-    """Return `distances` of M tracks at once, float64 (M, N) [m]."""
+def distances(points: Points, tracks: Sequence[Track]) -> Array:
+    """Return the distance from each of M tracks to each of (N, 2) points, odometry frame, float64 (M, N) [m]."""
     means = np.array([*map(attrgetter("mean"), tracks)]).reshape(-1, 4, 1)
     return np.asarray(np.hypot(points[:, 0] - means[:, 0], points[:, 1] - means[:, 1]))

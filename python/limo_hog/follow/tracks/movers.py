@@ -20,7 +20,7 @@ from limo_hog.follow.sense.measurement import STATURE, Measurement
 from limo_hog.follow.sense.observation import Mask, Odometry
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks import kalman
-from limo_hog.follow.tracks.association import Legs, Returns, all_distances, distances
+from limo_hog.follow.tracks.association import Legs, Returns, distances
 from limo_hog.follow.tracks.kalman import Noise, Track
 from limo_hog.follow.tracks.person import Person
 
@@ -107,7 +107,7 @@ class Movers:
         if ground is not None and len(places):
             places = places[~grid.is_blocked(ground, places, lasting=True)]
         reach = np.array([legs[mover.stature].radius for mover in kept])[:, None]
-        new = (all_distances(places, [*map(attrgetter("track"), kept)]) > reach).all(axis=0)
+        new = (distances(places, [*map(attrgetter("track"), kept)]) > reach).all(axis=0)
         begun = [self._begin(place, returns, noise) for place in places[new]]
         return (*kept, *begun)
 
@@ -133,14 +133,14 @@ class Movers:
         walking = [mover for mover in self.moving(movers, since) if mover.number != person.number]
         others = [mover.track for mover in walking if is_felt or mover.number is not None]
         points, legs = returns.points, self.legs.of(person.stature)
-        gaps = distances(points, track)
+        (gaps,) = distances(points, [track])
         own = gaps < legs.radius
         if others:
             others = [kalman.predict(other, returns.stamp, noise) for other in others]
             if self._merged([track, *others])[0, 1:].any():
                 # Their own legs go on as they went: `continued`.
                 return person
-            own &= gaps <= all_distances(points, others).min(axis=0)
+            own &= gaps <= distances(points, others).min(axis=0)
         points = points[own]
         if is_ground is not None and len(points):
             points = points[~is_ground(points)]
@@ -221,7 +221,7 @@ class Movers:
         through each other share their returns: both are moved by the error of their middle, and keep their velocities.
         """
         points, found = returns.points, list[Track | None]()
-        gaps = all_distances(points, expected)
+        gaps = distances(points, expected)
         near = gaps < np.array([leg.radius for leg in legs]).reshape(-1, 1)
         whose = np.where(near, gaps, np.inf)[:claims].argmin(axis=0) if claims else np.zeros(len(points), np.int64)
         free, merged = np.ones(len(points), bool), self._merged(expected[:claims])
@@ -233,7 +233,7 @@ class Movers:
                 shift = places[index] - places[:claims][merged[index]].mean(axis=0)
             track = leg.corrected(expected[index], points[own] + shift, returns.pose, noise)
             if track is not None:
-                free &= ~own | (distances(points, track) > leg.radius)
+                free &= ~own | (distances(points, [track])[0] > leg.radius)
             found.append(track)
         return found
 

@@ -15,7 +15,7 @@ from limo_hog.follow.sense.observation import Array
 class RoomToFollowed(Room):
     """Room to the person followed; a contact costs more than to lose sight of them."""
 
-    contact: float = param(6.0, "m", "What a sure contact costs besides.", 0, 100)
+    contact: float = param(4.5, "m", "What a sure contact costs besides.", 0, 100)
 
     def cost(self, rollouts: Rollouts, situation: Situation) -> Array:
         """Return the cost of each rollout before its weight, float64 (K,) [m]."""

@@ -58,7 +58,7 @@ class Sampling:
     margin: Margin = field(default_factory=lambda: Margin(0.62, 0.22))
     blind_speed: float = param(0.2, "m/s", "Highest speed backwards onto ground that is not known.", 0, 1)
     company_speed: float = param(0.3, "m/s", "Highest speed backwards while other people are about.", 0, 1)
-    fresh_s: float = param(1.0, "s", "How long nobody can have come to ground seen free, to back at full speed.", 0, 60)
+    fresh_s: float = param(1.0, "s", "How long nobody can have come to ground seen free, to back faster.", 0, 60)
 
     times: Array = field(init=False, repr=False, compare=False)  #: When the steps end, float64 (T,) [s].
 

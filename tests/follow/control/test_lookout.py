@@ -68,10 +68,37 @@ def test_the_camera_does_not_show_who_stands_behind_another() -> None:
     assert np.unique(after.places.points, axis=0).tolist() == [list(behind)]
 
 
-def test_whoever_may_be_behind_another_is_looked_for_from_elsewhere() -> None:
-    hunt = hunt_for(np.array([(4.5, 0.0)] * 10), -math.inf)
-    for seen, drives in ((BLIND, False), (SOMEBODY_AHEAD, True)):
-        assert (len(LOOKOUT.step(hunt, seen, NOTHING, situated(free_ground())).way) > 0) == drives
+def test_places_behind_another_count_half_and_the_other_may_soon_have_gone() -> None:
+    hidden, beside = (4.5, 0.0), (0.0, 4.5)
+    # To turn costs time: 6 places straight ahead, or 12 that count half, are worth as much as 10 to one side.
+    for ahead, faced in ((8, beside), (14, hidden)):
+        hunt = hunt_for(np.array([beside] * 10 + [hidden] * ahead), -math.inf)
+        for seen, place in ((BLIND, hidden), (SOMEBODY_AHEAD, faced)):
+            after = LOOKOUT.step(hunt, seen, NOTHING, situated(free_ground()))
+            assert len(after.way) == 0
+            assert after.facing == pytest.approx(place)
+
+
+def test_a_direction_that_is_turned_to_is_kept_until_another_is_half_as_good_again() -> None:
+    for more, kept in ((1.3, True), (2.0, False)):
+        few, many = np.full((24, 2), (0.0, 3.0)), np.full((round(24 * more), 2), (0.0, -3.0))
+        hunt = hunt_for(np.concatenate([few, many]), -np.inf)
+        assert there(LOOKOUT.step(hunt, BLIND, NOTHING, situated(free_ground())).facing)[1] < 0
+        after = LOOKOUT.step(replace(hunt, facing=(0.0, 3.0)), BLIND, NOTHING, situated(free_ground()))
+        assert (there(after.facing)[1] > 0) == kept
+
+
+def test_a_place_that_is_faced_and_still_may_hide_the_person_is_driven_to() -> None:
+    drives, reason = goal([], (4.0, 1.0))
+    assert (there(drives).speed, there(drives).keeps) == (LOOKOUT.speed, LOOKOUT.near)
+    assert there(drives).places == pytest.approx(np.array([(4.0, 1.0)] * 2))
+    assert reason == "driving to where the lost person may be"
+    assert there(goal([], (2.3, 0.0))[0]).speed == pytest.approx(0.3)
+    # From near by, and while it is yet to be faced, the robot only turns.
+    for facing in ((1.9, 0.0), (2.0, 2.0), (-4.0, 0.0)):
+        turns, reason = goal([], facing)
+        assert (there(turns).speed, there(turns).places) == (0.0, None)
+        assert reason == "turning to where the lost person may be"
 
 
 @dataclass(frozen=True, slots=True)

@@ -49,6 +49,8 @@ class Lookout:
     settle_s: float = param(1.5, "s", "Time that looking from a place takes, however near it is.")
     turn_rate: float = param(1.0, "rad/s", "Mean turn rate on the way there and at its end.", 0.1, 3)
     least: float = param(0.05, "1", "A place that shows less of where the person may be is not driven to.")
+    hidden: float = param(0.5, "1", "What a place counts before which somebody stands, who may soon have gone.")
+    near: float = param(2.0, "m", "How near a place is driven to that is faced, and still may hide the person.", 0.5, 8)
     give_up_s: float = param(60.0, "s", "Then looking round ends, and the robot turns in place.", 0, 3600)
     wandering: Wandering = field(default_factory=Wandering)
     router: Router = field(default_factory=Router)
@@ -90,13 +92,16 @@ class Lookout:
             places = from_odometry(along(hunt.way, pose, self.speed * times), pose)
             goal = Goal(situation.bearing_of(x, y), 0.0, self.speed, self.speed, places, faces=False)
             return goal, "looking round for the lost person"
-        if hunt.facing is not None:
-            return self.facing(situation.bearing_of(*hunt.facing)), "turning to where the lost person may be"
-        return None, "searching for the lost person"
-
-    def facing(self, off: float) -> Goal:
-        """Return the goal to face what is `off` straight ahead [rad]."""
-        return Goal(off, turn_limit=self.facing_rate)
+        if hunt.facing is None:
+            return None, "searching for the lost person"
+        goal = Goal(situation.bearing_of(*hunt.facing), turn_limit=self.facing_rate)
+        further = math.dist(hunt.facing, (pose.x, pose.y)) - self.near
+        if further <= 0 or abs(goal.heading) >= self.half_view:
+            return goal, "turning to where the lost person may be"
+        # Somebody stands before it, or it is too far away for HOG.
+        places = np.repeat(from_odometry(np.array([hunt.facing]), pose), len(times), axis=0)
+        goal = replace(goal, speed=min(further, self.speed), places=places, keeps=self.near)
+        return goal, "driving to where the lost person may be"
 
     def ways(self, hunt: Hunt, situation: Situation) -> tuple[tuple[tuple[float, float], ...], ...]:
         """Return the places and the way in the base frame [m], for those who watch."""
@@ -113,24 +118,26 @@ class Lookout:
         far = np.concatenate([[0.0], routes[cells[:, 0], cells[:, 1]]])
         points = hunt.places.points[:: max(len(hunt.places.points) // 50, 1)]
         dx, dy = (points[None, :] - origins[:, None]).transpose(2, 0, 1)
-        seen = (np.hypot(dx, dy) < self.view) & grid.sees(ground, origins, points)
-        # What somebody stands before is not seen from here.
-        seen[0] &= ~self.wandering.beams_to(points, scan, pose, situation.robot)[1]
+        seen = np.where((np.hypot(dx, dy) < self.view) & grid.sees(ground, origins, points), 1.0, 0.0)
+        seen[0, self.wandering.beams_to(points, scan, pose, situation.robot)[1]] *= self.hidden
         faced = np.linspace(-math.pi, math.pi, self.directions, endpoint=False)
-        shown = seen[:, None] & (turn_between(np.arctan2(dy, dx)[:, None], faced[:, None]) < self.half_view)
+        shown = seen[:, None] * (turn_between(np.arctan2(dy, dx)[:, None], faced[:, None]) < self.half_view)
         share = shown.mean(axis=2)
         courses = np.arctan2(origins[:, 1] - pose.y, origins[:, 0] - pose.x)
         courses[0] = pose.yaw
         turns = turn_between(courses, pose.yaw)[:, None] + turn_between(courses[:, None], faced)
         worth = share / (self.settle_s + far[:, None] / self.speed + turns / self.turn_rate)
         if len(hunt.way):
-            # Two places of about the same worth would be driven to in turns.
+            # Two places of about the same worth would be driven to, or turned to, in turns.
             goal = np.hypot(*(origins - hunt.way[-1]).T)
             worth[(goal < self.same_goal)[:, None] & (share >= self.least)] *= self.stay
+        elif hunt.facing is not None:
+            faces = math.atan2(hunt.facing[1] - pose.y, hunt.facing[0] - pose.x)
+            worth[0, turn_between(faced, faces) < self.half_view] *= self.stay
         best, side = divmod(int(np.argmax(worth)), self.directions)
         if share[best, side] < self.least:
             return replace(hunt, way=NO_POINTS, facing=None, planned=now)
-        middle = points[shown[best, side]].mean(axis=0)
+        middle = points[shown[best, side] > 0].mean(axis=0)
         facing = float(middle[0]), float(middle[1])
         way = NO_POINTS if best == 0 else self.router.way(grid, ground, routes, tuple(cells[best - 1]))
         return replace(hunt, way=way, facing=facing, planned=now)

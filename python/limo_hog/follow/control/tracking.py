@@ -236,7 +236,8 @@ class TrackingController:
         moving = self.tracker.may_be(choice.number, state.tracks, situation.now)
         if known is None and moving:
             off = min((bearing_range(track, situation.pose)[0] for track in moving), key=abs)
-            return Aimed(lookout.facing(off), mode, "turning to what moves in the scan", state), Belief()
+            turns = Goal(off, turn_limit=lookout.facing_rate)
+            return Aimed(turns, mode, "turning to what moves in the scan", state), Belief()
         goal, belief, reason = None, Belief(), "searching for the lost person" if lost else "searching for a person"
         young = known is not None and situation.now - known.stamp < lookout.give_up_s
         if lost and known is not None and young and scan is not None and situation.ground is not None:

@@ -300,7 +300,4 @@ ZONE_ENDS = {Zone.INTIMATE: 0.45, Zone.PERSONAL: 1.2, Zone.SOCIAL: 3.6}
 
 def zone_of(distance: float) -> Zone:
     """Return the zone of a person `distance` [m] away."""
-    for zone, end in ZONE_ENDS.items():
-        if distance <= end:
-            return zone
-    return Zone.PUBLIC
+    return next((zone for zone, end in ZONE_ENDS.items() if distance <= end), Zone.PUBLIC)

@@ -51,11 +51,8 @@ class Wandering:
         return Places(stamp, drawn[:, :2], velocities, 1)
 
     def walk_on(self, places: Places, stamp: float, grid: Grid, ground: Ground) -> Places:
-        """Let time pass until `stamp` [s]; nobody walks through what is occupied."""
-        dt = stamp - places.stamp
-        if dt <= 0:
-            return places
-        random = np.random.default_rng([places.seed, 1])
+        """Let time pass until `stamp` [s], which is later; nobody walks through what is occupied."""
+        dt, random = stamp - places.stamp, np.random.default_rng([places.seed, 1])
         count = len(places.points)
         velocities = places.velocities.copy()
         change = random.random(count) < dt / self.change_s

@@ -41,10 +41,7 @@ class Tracks:
 
     def person(self, number: int | None) -> Person | None:
         """Return the person of a number, if they are tracked."""
-        for person in self.people:
-            if person.number == number:
-                return person
-        return None
+        return next((person for person in self.people if person.number == number), None)
 
     @property
     def in_view(self) -> list[Person]:

@@ -68,13 +68,18 @@ def test_the_camera_does_not_show_who_stands_behind_another() -> None:
     assert np.unique(after.places.points, axis=0).tolist() == [list(behind)]
 
 
-def test_places_behind_another_count_half_and_the_other_may_soon_have_gone() -> None:
+def test_places_behind_somebody_who_walks_count_half_and_behind_what_stands_nothing() -> None:
     hidden, beside = (4.5, 0.0), (0.0, 4.5)
     # To turn costs time: 6 places straight ahead, or 12 that count half, are worth as much as 10 to one side.
+    walks = situated(free_ground())
+    # What stands there is among the situation's points; who walks is not.
+    stands = replace(walks, points=np.array([(1.0, 0.0)]))
     for ahead, faced in ((8, beside), (14, hidden)):
         hunt = hunt_for(np.array([beside] * 10 + [hidden] * ahead), -math.inf)
-        for seen, place in ((BLIND, hidden), (SOMEBODY_AHEAD, faced)):
-            after = LOOKOUT.step(hunt, seen, NOTHING, situated(free_ground()))
+        for seen, about, place in (
+            (BLIND, walks, hidden), (SOMEBODY_AHEAD, walks, faced), (SOMEBODY_AHEAD, stands, beside)
+        ):  # fmt: skip
+            after = LOOKOUT.step(hunt, seen, NOTHING, about)
             assert len(after.way) == 0
             assert after.facing == pytest.approx(place)
 

@@ -59,7 +59,6 @@ class Following:
     prompt_s: float = param(0.1, "s", "An image this late costs no distance.", 0, 5)
     near_hiding: float = param(1.2, "m", "Distance to hold to a person who will soon be out of sight.", 0.5, 8)
     foresight_s: float = param(1.0, "s", "How soon that is, in their way.", 0, 5)
-    occluder_half_width: float = param(0.12, "m", "Something this near to the line of sight hides the person.")
     margin: Margin = field(default_factory=lambda: Margin(0.65, 0.25))
     look_ahead: float = param(1.2, "m", "So much of the direct way must be free, else one is planned.")
     ahead: float = param(0.5, "m", "The point of a way that is faced is this far off.")
@@ -77,13 +76,6 @@ class Following:
         headway = (late_s + self.headway_s / math.sqrt(situation.acceleration)) * brisk
         keeps = max(asked, least, min(headway, self.most_headway))
         return self.near_hiding if keeps > self.near_hiding and situation.is_behind(soon) else keeps
-
-    def is_hidden(self, bearing: float, distance: float, situation: Situation) -> bool:
-        """Whether something is on the line of sight to the person."""
-        x, y = situation.points.T
-        across, along_it = y * math.cos(bearing) - x * math.sin(bearing), x * math.cos(bearing) + y * math.sin(bearing)
-        before = (along_it > 0) & (along_it < distance - PERSON_RADIUS)
-        return bool((before & (np.abs(across) < self.occluder_half_width)).any())
 
     def aim(self, followed: Followed, situation: Situation, state: TrackingState, sampling: Sampling) -> Aimed:
         """Return the goal that holds the distance to a person."""

@@ -49,7 +49,7 @@ class Lookout:
     settle_s: float = param(1.5, "s", "Time that looking from a place takes, however near it is.")
     turn_rate: float = param(1.0, "rad/s", "Mean turn rate on the way there and at its end.", 0.1, 3)
     least: float = param(0.05, "1", "A place that shows less of where the person may be is not driven to.")
-    hidden: float = param(0.5, "1", "What a place counts before which somebody stands, who may soon have gone.")
+    hidden: float = param(0.5, "1", "What a place counts before which somebody walks, who will soon have gone.")
     near: float = param(2.0, "m", "How near a place is driven to that is faced, and still may hide the person.", 0.5, 8)
     give_up_s: float = param(60.0, "s", "Then looking round ends, and the robot turns in place.", 0, 3600)
     wandering: Wandering = field(default_factory=Wandering)
@@ -120,6 +120,7 @@ class Lookout:
         dx, dy = (points[None, :] - origins[:, None]).transpose(2, 0, 1)
         seen = np.where((np.hypot(dx, dy) < self.view) & grid.sees(ground, origins, points), 1.0, 0.0)
         seen[0, self.wandering.beams_to(points, scan, pose, situation.robot)[1]] *= self.hidden
+        seen[0, situation.hides(np.arctan2(dy[0], dx[0]) - pose.yaw, np.hypot(dx[0], dy[0]))] = 0.0
         faced = np.linspace(-math.pi, math.pi, self.directions, endpoint=False)
         shown = seen[:, None] * (turn_between(np.arctan2(dy, dx)[:, None], faced[:, None]) < self.half_view)
         share = shown.mean(axis=2)
@@ -137,10 +138,9 @@ class Lookout:
         best, side = divmod(int(np.argmax(worth)), self.directions)
         if share[best, side] < self.least:
             return replace(hunt, way=NO_POINTS, facing=None, planned=now)
-        middle = points[shown[best, side] > 0].mean(axis=0)
-        facing = float(middle[0]), float(middle[1])
+        x, y = points[shown[best, side] > 0].mean(axis=0).tolist()
         way = NO_POINTS if best == 0 else self.router.way(grid, ground, routes, tuple(cells[best - 1]))
-        return replace(hunt, way=way, facing=facing, planned=now)
+        return replace(hunt, way=way, facing=(x, y), planned=now)
 
     def _anywhere(self, hunt: Hunt, situation: Situation) -> Places | None:
         """Return places spread over the ground that was not seen lately, as far as the person can have walked."""
@@ -152,5 +152,4 @@ class Lookout:
         if len(points) == 0:
             return None
         count, random = self.wandering.count, np.random.default_rng([hunt.places.seed, 3])
-        chosen = points[random.integers(len(points), size=count)]
-        return Places(now, chosen, np.zeros((count, 2)), hunt.places.seed + 1)
+        return Places(now, points[random.integers(len(points), size=count)], np.zeros((count, 2)), hunt.places.seed + 1)

@@ -10,11 +10,14 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.robot import RobotGeometry, Twist
 from limo_hog.follow.sense.clearance import Points, from_odometry, places_behind, to_odometry
+from limo_hog.follow.sense.measurement import PERSON_RADIUS
 from limo_hog.follow.sense.observation import Array, Odometry
 from limo_hog.follow.space.grid import Grid, Ground
 
 #: Ground behind the robot is looked at so far behind its outline [m]: from .6 m/s it stops within .33 m.
 DEPTHS = (0.1, 0.2, 0.3)
+#: Something this near to a line of sight hides what is behind it [m]. Chosen: half the width of a person.
+HIDES = 0.12
 #: How long ground that was seen free counts as known [s]: a second less than `Guard.memory_s`.
 KNOWN_S = 59.0
 
@@ -68,6 +71,13 @@ class Situation:
         known = self.grid.is_free_since(self.ground, places, self.ground.stamp - within)
         known, risky = known.reshape(x.shape), (hides & ~known).reshape(x.shape)
         return np.asarray(known.all(axis=-1)), np.asarray(risky.any(axis=-1))
+
+    def hides(self, bearings: Array, distances: Array) -> NDArray[np.bool_]:
+        """Return whether something that stands hides each of (N,) places from the robot [rad, m], bool (N,)."""
+        (x, y), cos, sin = self.points.T, np.cos(bearings)[:, None], np.sin(bearings)[:, None]
+        ahead, aside = x * cos + y * sin, y * cos - x * sin
+        before = (ahead > 0) & (ahead < distances[:, None] - PERSON_RADIUS)
+        return np.asarray((before & (np.abs(aside) < HIDES)).any(axis=1))
 
     def is_behind(self, place: tuple[float, float]) -> bool:
         """Whether something that lasts is between the robot and a place in the odometry frame [m]."""

@@ -119,8 +119,9 @@ class Lookout:
         points = hunt.places.points[:: max(len(hunt.places.points) // 50, 1)]
         dx, dy = (points[None, :] - origins[:, None]).transpose(2, 0, 1)
         seen = np.where((np.hypot(dx, dy) < self.view) & grid.sees(ground, origins, points), 1.0, 0.0)
+        # From here people, too, hide what is behind them: who walks soon gives it free, what stands does not.
         seen[0, self.wandering.beams_to(points, scan, pose, situation.robot)[1]] *= self.hidden
-        seen[0, situation.hides(np.arctan2(dy[0], dx[0]) - pose.yaw, np.hypot(dx[0], dy[0]))] = 0.0
+        seen[0, situation.is_hidden(np.arctan2(dy[0], dx[0]) - pose.yaw, np.hypot(dx[0], dy[0]))] = 0.0
         faced = np.linspace(-math.pi, math.pi, self.directions, endpoint=False)
         shown = seen[:, None] * (turn_between(np.arctan2(dy, dx)[:, None], faced[:, None]) < self.half_view)
         share = shown.mean(axis=2)
@@ -133,8 +134,7 @@ class Lookout:
             goal = np.hypot(*(origins - hunt.way[-1]).T)
             worth[(goal < self.same_goal)[:, None] & (share >= self.least)] *= self.stay
         elif hunt.facing is not None:
-            faces = math.atan2(hunt.facing[1] - pose.y, hunt.facing[0] - pose.x)
-            worth[0, turn_between(faced, faces) < self.half_view] *= self.stay
+            worth[0, turn_between(faced, pose.yaw + situation.bearing_of(*hunt.facing)) < self.half_view] *= self.stay
         best, side = divmod(int(np.argmax(worth)), self.directions)
         if share[best, side] < self.least:
             return replace(hunt, way=NO_POINTS, facing=None, planned=now)

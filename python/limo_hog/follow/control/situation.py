@@ -72,7 +72,7 @@ class Situation:
         known, risky = known.reshape(x.shape), (hides & ~known).reshape(x.shape)
         return np.asarray(known.all(axis=-1)), np.asarray(risky.any(axis=-1))
 
-    def hides(self, bearings: Array, distances: Array) -> NDArray[np.bool_]:
+    def is_hidden(self, bearings: Array, distances: Array) -> NDArray[np.bool_]:
         """Return whether something that stands hides each of (N,) places from the robot [rad, m], bool (N,)."""
         (x, y), cos, sin = self.points.T, np.cos(bearings)[:, None], np.sin(bearings)[:, None]
         ahead, aside = x * cos + y * sin, y * cos - x * sin

@@ -181,7 +181,7 @@ class TrackingController:
         lost_s, brisk = min(observation.stamp - person.seen, now - person.felt), state.brisk
         if lost_s <= self.tracker.scan_period_s:
             state = self._measured(person, bearing, situation, state)
-        hidden = bool(situation.hides(np.array([bearing]), np.array([distance]))[0])
+        hidden = bool(situation.is_hidden(np.array([bearing]), np.array([distance]))[0])
         patience = self.tracker.forget_s if hidden else following.waits_s
         # Behind another person one is hidden for a moment: waiting is better than driving round people.
         waits = hidden and state.hunt is None and not situation.is_behind(person.track.place)

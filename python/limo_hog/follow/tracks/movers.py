@@ -22,7 +22,7 @@ from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.association import Legs, Returns, distances
 from limo_hog.follow.tracks.kalman import Noise, Track
-from limo_hog.follow.tracks.person import Person
+from limo_hog.follow.tracks.person import Person, predict
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,9 +152,11 @@ class Movers:
         means = [mover.track.mean for mover in movers if now - mover.felt < self.forget_s]
         return np.array(means).reshape(-1, 4)[:, :2]
 
-    def assign(self, movers: tuple[Mover, ...], seen: Sequence[Person], stamp: float) -> tuple[Mover, ...]:
+    def assign(
+        self, movers: tuple[Mover, ...], seen: Sequence[Person], stamp: float, noise: Noise
+    ) -> tuple[Mover, ...]:
         """Note whose legs they are: one mover to one person found by the camera, the nearest first."""
-        pairs = []
+        pairs, seen = [], [predict(person, stamp, noise) for person in seen]
         felt = [(which, mover) for which, mover in enumerate(movers) if mover.felt == stamp]
         with_legs = {mover.number for _, mover in felt}
         for who, person in enumerate(seen):
@@ -196,18 +198,12 @@ class Movers:
                     pairs.add((who, which))
         return pairs
 
-    def continued(self, person: Person, movers: tuple[Mover, ...], returns: Returns, noise: Noise) -> Person:
-        """Return a person whom the camera does not show, brought up to a scan that shows their legs."""
+    def continued(self, person: Person, movers: tuple[Mover, ...], returns: Returns) -> Person:
+        """Return a person whom the camera does not show, where a scan shows their legs."""
         legs = [mover for mover in movers if mover.number == person.number and mover.felt == returns.stamp]
         if not legs or returns.stamp <= person.felt:
             return person
-        track, pose = kalman.predict(person.track, returns.stamp, noise), returns.pose
-        x, y, _, _ = legs[0].track.mean
-        dx, dy = x - pose.x, y - pose.y
-        distance = math.hypot(dx, dy)
-        noise = self.legs.noise_at(distance, noise, pose)
-        fit = kalman.innovation(track, math.atan2(dy, dx) - pose.yaw, distance, pose, noise)
-        return replace(person, track=kalman.update(track, fit), felt=returns.stamp)
+        return replace(person, track=legs[0].track, felt=returns.stamp)
 
     def _has_moved(self, mover: Mover) -> bool:
         return mover.left and mover.scans >= self.fewest_scans and mover.way > self.least_way
@@ -290,9 +286,12 @@ class Movers:
 
 
 def named(mover: Mover, person: Person, stamp: float) -> Mover:
-    """Return what the camera shows to be a person's legs."""
+    """Return what the camera shows to be a person's legs: they are where the person is, at the same stamp.
+
+    Where two pass each other, either may have the other's returns; a box tells them apart.
+    """
     since = mover.named if mover.number == person.number else stamp
-    return replace(mover, number=person.number, stature=person.stature, shown=0, named=since)
+    return replace(mover, track=person.track, number=person.number, stature=person.stature, shown=0, named=since)
 
 
 def is_in_view(track: Track, returns: Returns, half_view: float, robot: RobotGeometry, towards: float = 0.0) -> bool:

@@ -226,12 +226,12 @@ class Tracker:
         seen = [person for person in people if person.confirmed and person.seen == tracks.stamp]
         for returns in new:
             movers = self.movers.update(movers, returns, views, self.noise, grid, ground)
-            movers = self.movers.assign(movers, seen, returns.stamp)
+            movers = self.movers.assign(movers, seen, returns.stamp, self.noise)
             unseen = [person for person in people if person.confirmed and person.seen != tracks.stamp]
             walking = {mover.number for mover in self.movers.moving(movers)} if unseen else set()
             for person in unseen:
                 if (tracks.stamp or 0.0) - person.seen < self.legs_only_s or person.number in walking:
-                    now = self.movers.continued(person, movers, returns, self.noise)
+                    now = self.movers.continued(person, movers, returns)
                     people = tuple(now if other is person else other for other in people)
         return replace(tracks, people=people, movers=movers, moved_at=new[-1].stamp)
 

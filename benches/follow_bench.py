@@ -1,6 +1,6 @@
 """Scenes of Follow-Bench (arXiv 2509.10796) at 1:2, where a Limo is half of its robot and our person half of a man.
 
-    uv run python -m benches.follow_bench FOLDER --controllers tracking oracle crude --json out/follow_bench.jsonl
+    uv run python -m benches.follow_bench FOLDER --controllers tracking oracle sighted crude --json out/runs.jsonl
 
 FOLDER holds files of its `dynamic_scenarios/config` and `layout_scenarios/config`, of which none come along; of these
 the files `…_back_1.yaml` to `…_back_40.yaml` are played, each with its number as the seed. Lengths and speeds are
@@ -243,8 +243,9 @@ PAGE = Path(__file__).parents[1] / "docs" / "benchmark.md"
 HEADING = "## Follow-Bench at 1:2"
 PROSE = """Scenes that others wrote ([Follow-Bench](https://arxiv.org/abs/2509.10796), MIT), one run of 60 s each, by
 `python -m benches.follow_bench FOLDER --page`, which says how its files are read. `oracle` is `tracking` with true
-positions in place of what it sees; `crude` a sampled rollout with true positions and no routes: what could be won by
-better senses, and by a better planner. "Until arrival" is the way on which the person first walks to their goal.
+positions in place of what it sees, `sighted` with those of the people alone whom camera or scan show; `crude` a sampled
+rollout with true positions and no routes: what could be won by better senses, by better tracking, and by a better
+planner. "Until arrival" is the way on which the person first walks to their goal.
 
 The figures are not comparable with those of the paper. There, planners know all positions and a run ends at the goal;
 here the senses are honest, the camera sees 71°, ORCA's people walk by social forces, and all walk to and fro, so that

@@ -1,7 +1,8 @@
 """Followers that are given the arena's true positions, for `follow_bench`: what could be won by better senses.
 
-`oracle` is the tracking controller with true tracks in place of its own. `crude` is a sampled rollout with critics
-that knows no routes. Both stand behind `Guard` as every controller does, and see walls by the lidar alone.
+`oracle` is the tracking controller with true tracks in place of its own, `sighted` the same with the people alone whom
+its senses show. `crude` is a sampled rollout with critics that knows no routes. All stand behind `Guard` as every
+controller does, and see walls by the lidar alone.
 """
 
 from __future__ import annotations
@@ -19,29 +20,30 @@ from limo_hog.follow.control.tracking import TrackingController
 from limo_hog.follow.decision import Controller, Decision, Mode
 from limo_hog.follow.pipeline import Follower
 from limo_hog.follow.robot import LIMO, Twist
-from limo_hog.follow.sense.clearance import scan_points
+from limo_hog.follow.sense.clearance import from_odometry, scan_points
 from limo_hog.follow.sense.measurement import WINDOW_PER_STATURE
 from limo_hog.follow.sense.observation import Observation, Odometry, pose_at
 from limo_hog.follow.tracks.kalman import Track
-from limo_hog.follow.tracks.person import Person
+from limo_hog.follow.tracks.person import Person, predict
 from limo_hog.follow.tracks.tracker import Tracker, Tracks
 from limo_sim.run.arena import Arena
 from limo_sim.run.matching import CRITERIA
 
 #: What `oracle` makes.
-ORACLES = ("oracle", "crude")
+ORACLES = ("oracle", "sighted", "crude")
 #: Number of the person to be followed: the scenario's first.
 FOLLOWED = 1
 _EXACT = (1e-4, 0.0, 0.0, 0.0, 1e-4, 0.0, 0.0, 1e-3, 0.0, 1e-3)
 
 
 def oracle(name: str, arena: Arena) -> Follower[Any]:
-    """Return the follower `oracle` or `crude` for one arena; its boxes are the silhouettes of people in view."""
+    """Return one of `ORACLES` for an arena; its boxes are the silhouettes of people in view."""
     controller: Controller[Any]
     if name == "crude":
         controller = Crude(arena)
     else:
-        controller = replace(TrackingController(), tracker=TrueTracker(arena=arena), selection=TrueSelection())
+        tracker = SightedTracker(arena=arena) if name == "sighted" else TrueTracker(arena=arena)
+        controller = replace(TrackingController(), tracker=tracker, selection=TrueSelection())
     return Follower(controller, TrueDetector(arena), search=lambda detector, image, _: detector.detect(image))
 
 
@@ -108,6 +110,55 @@ class TrueTracker(Tracker):
     def follow_movers(self, tracks: Tracks, *_: Any) -> Tracks:
         """Return the same: nobody moves in the scan whom the tracks lack."""
         return tracks
+
+
+#: `sighted` knows a person by sight up to here [m], near enough for HOG, and for so long without being shown them [s].
+BY_SIGHT_M, HIDDEN_S = 5.0, 0.15
+#: A return so near to a person is theirs [m]: half as much again as a body's radius and its legs' swing.
+RETURN_M = 0.3
+#: Added to the number of a person of whom `sighted` does not know who it is.
+STRANGER = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class SightedTracker(TrueTracker):
+    """Everybody whom the camera shows, or the scan within the reach of `Legs`, as a track without an error.
+
+    A person whom neither showed for `HIDDEN_S` is a stranger until the camera shows them within `BY_SIGHT_M`.
+    `shown` is when each was last shown [s], `strangers` whose number is not known.
+    """
+
+    shown: dict[int, float] = field(default_factory=dict)
+    strangers: set[int] = field(default_factory=set)
+
+    def update(self, observation: Observation, tracks: Tracks) -> tuple[Tracks, dict[int, int]]:
+        """Bring the tracks of those who are shown up to a frame, and predict the others; as `Tracker.update`."""
+        now, boxes = TrueTracker.update(self, observation, tracks)
+        stamp, pose, people = observation.stamp, pose_at(now.poses, observation.stamp), list[Person]()
+        returns = np.empty((0, 2)) if observation.scan is None else scan_points(observation.scan, self.robot)
+        for person in now.people:
+            number = person.number
+            (at,) = from_odometry(np.array([person.track.place]), pose)
+            by_sight = number in boxes and math.hypot(*at) < BY_SIGHT_M
+            felt = math.hypot(*at) < self.movers.legs.reach and (np.hypot(*(returns - at).T) < RETURN_M).any()
+            if by_sight:
+                self.strangers.discard(number)
+            elif not felt:
+                continue
+            elif stamp - self.shown.get(number, -math.inf) > HIDDEN_S:
+                self.strangers.add(number)
+            self.shown[number] = stamp
+            people.append(replace(person, number=number + STRANGER) if number in self.strangers else person)
+        numbers = {person.number for person in people}
+        hidden = [person for person in tracks.people if person.number not in numbers]
+        lately = [predict(person, stamp, self.noise) for person in hidden if stamp - person.felt < self.forget_s]
+        return replace(now, people=(*people, *lately)), boxes
+
+    def may_be(self, _: int | None, tracks: Tracks, now: float) -> list[Track]:
+        """Return the strangers whom the scan has just shown, as of `now` [s]."""
+        lately = now - self.movers.forget_s
+        strangers = [person for person in tracks.people if person.number > STRANGER and person.felt > lately]
+        return [predict(person, now, self.noise).track for person in strangers]
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,14 +1,16 @@
 """Follow-Bench's files become our scenes at half their size, and its oracles follow the first person."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from benches.follow_bench import BEHIND, FollowBenchError, number_of, read
-from benches.oracle import ORACLES, oracle
+from benches.oracle import ORACLES, STRANGER, oracle
 
 from limo_sim.run.arena import Arena
 from limo_sim.run.episode import play
 from limo_sim.run.log import Step
+from limo_sim.world.people import Person
 from limo_sim.world.scenario import Scenario
 
 FILE = """
@@ -66,3 +68,17 @@ def test_an_oracle_follows_the_first_person_and_comes_nearer(name: str, scene: S
         assert target is not None and first is not None
         assert tuple(step.log.detections.windows[target]) == first.box
     assert steps[-1].truth.robot[0] > scene.robot.x + 0.5
+
+
+def test_the_sighted_oracle_knows_of_nobody_behind_it_and_not_who_comes_from_there() -> None:
+    robot = Scenario.load("standing").robot
+    first = Person(route=((robot.x + 1.6, robot.y, 3600.0),))
+    # From behind the robot to where the lidar shows them, beside the image.
+    comes = Person(route=((robot.x - 2.0, robot.y + 1.5, 2.0), (robot.x + 0.3, robot.y + 1.5, 3600.0)))
+    scene = replace(Scenario.load("standing"), people=(first, comes))
+    known = {}
+    for name in ("oracle", "sighted"):
+        arena, steps = Arena(scene, 7), list[Step]()
+        play(arena, oracle(name, arena), 6.0, names=(name, "truth"), watch=steps.append)
+        known[name] = [{person.number for person in steps[at].log.decision.belief.people} for at in (10, -1)]
+    assert known == {"oracle": [{1, 2}, {1, 2}], "sighted": [{1}, {1, 2 + STRANGER}]}

@@ -112,9 +112,10 @@ class TrueTracker(Tracker):
         return tracks
 
 
-#: `sighted` knows a person by sight up to here [m], near enough for HOG, and for so long without being shown them [s].
+#: The camera shows `sighted` who a person is up to this distance [m]: near enough for HOG; hidden for longer than this
+#: [s], a person is not known again by the scan.
 BY_SIGHT_M, HIDDEN_S = 5.0, 0.15
-#: A return so near to a person is theirs [m]: half as much again as a body's radius and its legs' swing.
+#: A return this near to a person's place is theirs [m]: the radius of a body, and as much for the swing of the legs.
 RETURN_M = 0.3
 #: Added to the number of a person of whom `sighted` does not know who it is.
 STRANGER = 1000

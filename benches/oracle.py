@@ -20,7 +20,7 @@ from limo_hog.follow.control.tracking import TrackingController
 from limo_hog.follow.decision import Controller, Decision, Mode
 from limo_hog.follow.pipeline import Follower
 from limo_hog.follow.robot import LIMO, Twist
-from limo_hog.follow.sense.clearance import from_odometry, scan_points
+from limo_hog.follow.sense.clearance import NO_POINTS, from_odometry, scan_points
 from limo_hog.follow.sense.measurement import WINDOW_PER_STATURE
 from limo_hog.follow.sense.observation import Observation, Odometry, pose_at
 from limo_hog.follow.tracks.kalman import Track
@@ -112,12 +112,12 @@ class TrueTracker(Tracker):
         return tracks
 
 
-#: The camera shows `sighted` who a person is up to this distance [m]: near enough for HOG; hidden for longer than this
-#: [s], a person is not known again by the scan.
+#: Up to this distance the camera tells `sighted` who a person is [m]: HOG finds people there. After a person was hidden
+#: for this time, the scan alone does not [s].
 BY_SIGHT_M, HIDDEN_S = 5.0, 0.15
 #: A return this near to a person's place is theirs [m]: the radius of a body, and as much for the swing of the legs.
 RETURN_M = 0.3
-#: Added to the number of a person of whom `sighted` does not know who it is.
+#: Added to a person's number while `sighted` cannot tell who they are.
 STRANGER = 1000
 
 
@@ -136,7 +136,7 @@ class SightedTracker(TrueTracker):
         """Bring the tracks of those who are shown up to a frame, and predict the others; as `Tracker.update`."""
         now, boxes = TrueTracker.update(self, observation, tracks)
         stamp, pose, people = observation.stamp, pose_at(now.poses, observation.stamp), list[Person]()
-        returns = np.empty((0, 2)) if observation.scan is None else scan_points(observation.scan, self.robot)
+        returns = NO_POINTS if observation.scan is None else scan_points(observation.scan, self.robot)
         for person in now.people:
             number = person.number
             (at,) = from_odometry(np.array([person.track.place]), pose)
@@ -203,7 +203,7 @@ class Crude:
                 velocity = np.nan_to_num((places - state[1]) / (now.stamp - state[0]))
         turn = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
         there, velocity = (places - (x, y)) @ turn, velocity @ turn
-        walls = np.empty((0, 2)) if observation.scan is None else np.asarray(scan_points(observation.scan, LIMO))
+        walls = NO_POINTS if observation.scan is None else np.asarray(scan_points(observation.scan, LIMO))
         apart = np.linalg.norm(walls[:, None] - there[None], axis=2).min(axis=1)
         linear, angular = self._commands(wheels.linear)
         cost = self._cost(linear, angular, there, velocity, walls[apart > 0.35])

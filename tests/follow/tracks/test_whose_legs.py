@@ -17,27 +17,31 @@ from limo_hog.follow.tracks.tracker import Tracker, Tracks
 Place = tuple[float, float]
 
 
+def numbers(movers: tuple[Mover, ...]) -> list[int | None]:
+    return [mover.number for mover in movers]
+
+
 def test_the_legs_of_a_person_continue_the_track_that_the_camera_does_not_show() -> None:
     known = person(7, 1.55, 0.05, 0.875)
     movers = MOVERS.assign(walk((1.5, -0.4), (0.0, 0.5), 8), [known], 0.875, NOISE)
-    assert [one.number for one in movers] == [7]
+    assert numbers(movers) == [7]
     returns = Returns(1.0, np.array(legs(1.5, 0.1, 9.0)), Odometry())
     movers = MOVERS.update(movers, returns, (HALF_VIEW, 0.0), NOISE, GRID, FREE)
-    continued = MOVERS.continued(known, movers, returns)
+    continued = MOVERS.continued(known, movers, 1.0)
     assert continued.felt == 1.0
     assert math.dist(continued.track.mean[:2], (1.5, 0.1)) < math.dist(known.track.mean[:2], (1.5, 0.1))
     # Not one whose legs they are not, and each scan counts once.
-    assert MOVERS.continued(person(8, 1.5, 0.1, 0.9), movers, returns).felt < 0
-    assert MOVERS.continued(continued, movers, returns) is continued
+    assert MOVERS.continued(person(8, 1.5, 0.1, 0.9), movers, 1.0).felt < 0
+    assert MOVERS.continued(continued, movers, 1.0) is continued
 
 
 def test_two_people_side_by_side_have_one_pair_of_legs_each() -> None:
     movers = tuple(Mover(person(0, 1.5, y, 1.0).track, (1.5, y), 0.0, 1.0) for y in (0.0, 0.3))
     people = [person(1, 1.6, 0.2, 1.0), person(2, 1.5, 0.35, 1.0)]
-    assert [one.number for one in MOVERS.assign(movers, people, 1.0, NOISE)] == [1, 2]
+    assert numbers(MOVERS.assign(movers, people, 1.0, NOISE)) == [1, 2]
     # The number goes along with the person, and is given once.
     later = MOVERS.assign(MOVERS.assign(movers, people, 1.0, NOISE), [person(1, 1.5, 0.62, 1.0)], 1.0, NOISE)
-    assert [one.number for one in later] == [1]
+    assert numbers(later) == [1]
 
 
 def test_the_legs_of_a_tall_person_are_found_as_far_apart_as_their_stride() -> None:
@@ -71,10 +75,13 @@ def test_the_legs_of_two_who_walk_side_by_side_stay_apart() -> None:
 
 def test_legs_are_a_persons_since_the_camera_first_showed_that() -> None:
     legs_alone = Mover(person(0, 1.5, 0.0, 1.0).track, (1.5, 0.0), 0.0, 1.0)
-    movers = MOVERS.assign((legs_alone,), [person(1, 1.5, 0.0, 1.0)], 1.0, NOISE)
-    later = MOVERS.assign(tuple(replace(one, felt=2.0) for one in movers), [person(1, 1.5, 0.1, 2.0)], 2.0, NOISE)
-    other = MOVERS.assign(tuple(replace(one, felt=3.0) for one in later), [person(2, 1.5, 0.1, 3.0)], 3.0, NOISE)
-    assert [one.named for one in (*movers, *later, *other)] == [1.0, 1.0, 3.0]
+    movers: tuple[Mover, ...] = (legs_alone,)
+    since = list[float]()
+    for number, y, stamp in ((1, 0.0, 1.0), (1, 0.1, 2.0), (2, 0.1, 3.0)):
+        felt = tuple(replace(mover, felt=stamp) for mover in movers)
+        movers = MOVERS.assign(felt, [person(number, 1.5, y, stamp)], stamp, NOISE)
+        since += [mover.named for mover in movers]
+    assert since == [1.0, 1.0, 3.0]
 
 
 @pytest.mark.parametrize("late_s", [0.0, 0.4])
@@ -92,10 +99,10 @@ def test_a_person_keeps_their_legs_where_a_box_lies_between_two_who_pass() -> No
     movers = (walker(1, 1.5, 0.0), walker(2, 1.75, 0.25))
     between = [person(2, 1.6, 0.1, 1.0)]
     kept = MOVERS.assign(movers, between, 1.0, NOISE)
-    assert [one.number for one in kept] == [1, 2]
-    assert kept[0] == movers[0]
+    assert numbers(kept) == [1, 2]
+    assert [mover.track for mover in kept] == [movers[0].track, between[0].track]
     on_the_first = [person(2, 1.5, 0.0, 1.0)]
-    assert [one.number for one in MOVERS.assign(movers, on_the_first, 1.0, NOISE)] == [2]
+    assert numbers(MOVERS.assign(movers, on_the_first, 1.0, NOISE)) == [2]
 
 
 def test_a_box_on_other_legs_that_walk_is_not_the_persons_whose_own_walk_elsewhere() -> None:
@@ -123,7 +130,7 @@ def test_a_miss_says_nothing_of_a_person_whose_legs_walk() -> None:
 
 
 def assigned(movers: tuple[Mover, ...], *people: tuple[int, float, float]) -> list[int | None]:
-    return [one.number for one in MOVERS.assign(movers, [person(n, x, y, 1.0) for n, x, y in people], 1.0, NOISE)]
+    return numbers(MOVERS.assign(movers, [person(n, x, y, 1.0) for n, x, y in people], 1.0, NOISE))
 
 
 def test_legs_within_four_decimetres_of_a_person_are_theirs() -> None:

@@ -198,12 +198,10 @@ class Movers:
                     pairs.add((who, which))
         return pairs
 
-    def continued(self, person: Person, movers: tuple[Mover, ...], returns: Returns) -> Person:
-        """Return a person whom the camera does not show, where a scan shows their legs."""
-        legs = [mover for mover in movers if mover.number == person.number and mover.felt == returns.stamp]
-        if not legs or returns.stamp <= person.felt:
-            return person
-        return replace(person, track=legs[0].track, felt=returns.stamp)
+    def continued(self, person: Person, movers: tuple[Mover, ...], stamp: float) -> Person:
+        """Return a person whom the camera does not show, where the scan of a stamp [s] shows their legs."""
+        own = [mover.track for mover in movers if mover.number == person.number and mover.felt == stamp]
+        return replace(person, track=own[0], felt=stamp) if own and stamp > person.felt else person
 
     def _has_moved(self, mover: Mover) -> bool:
         return mover.left and mover.scans >= self.fewest_scans and mover.way > self.least_way

@@ -231,7 +231,7 @@ class Tracker:
             walking = {mover.number for mover in self.movers.moving(movers)} if unseen else set()
             for person in unseen:
                 if (tracks.stamp or 0.0) - person.seen < self.legs_only_s or person.number in walking:
-                    now = self.movers.continued(person, movers, returns)
+                    now = self.movers.continued(person, movers, returns.stamp)
                     people = tuple(now if other is person else other for other in people)
         return replace(tracks, people=people, movers=movers, moved_at=new[-1].stamp)
 

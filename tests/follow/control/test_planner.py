@@ -12,6 +12,7 @@ from limo_hog.follow.control.planner import NO_WAY, Move, Planner
 from limo_hog.follow.control.rollouts import DIRECT, Manoeuvre, Rollouts
 from limo_hog.follow.control.situation import Goal, Situation
 from limo_hog.follow.robot import LIMO, Twist
+from limo_hog.follow.sense.clearance import rooms_ahead
 from limo_hog.follow.sense.observation import Array, Odometry
 from limo_hog.follow.space.grid import Grid
 
@@ -79,7 +80,7 @@ def test_where_no_command_leads_anywhere_it_stands_and_says_so() -> None:
 
 def test_it_backs_slowly_where_somebody_out_of_sight_can_have_come() -> None:
     def backs(seen_s_ago: float, hidden_at: float) -> float:
-        seen = replace(situation(speed=-0.6), hiding=np.array([(hidden_at, 0.0, 2.0)]))
+        seen = replace(situation(speed=-0.6), hiding=np.array([(hidden_at, 0.0, 2.0), (9.0, 0.0, 2.0)]))
         ground = there(seen.ground)
         seen = replace(seen, ground=replace(ground, freed=ground.freed - seen_s_ago))
         return float(PLANNER.sampling.roll_out(seen, Goal(0.0), DIRECT).wanted.min())
@@ -236,3 +237,16 @@ def test_in_mind_the_robot_brakes_no_faster_than_its_wheels_can() -> None:
     ahead = np.flatnonzero((rollouts.offs == 0) & (rollouts.wanted > 0))
     # Braking distance v² / 2a, in steps of the rollout.
     assert rollouts.poses[ahead, -1, 0].min() == pytest.approx(v**2 / 2 / a, rel=0.05)
+
+
+def test_each_command_leads_as_far_as_what_stands_in_its_own_direction_lets_it() -> None:
+    def gone(rollouts: Rollouts) -> Array:
+        return np.asarray(rollouts.speeds.sum(axis=1) * PLANNER.sampling.step_s)
+
+    post, goal, kept = np.array([(1.0, 0.5)]), towards(3.0, speed=0.8), Manoeuvre(0.5)
+    held = PLANNER.sampling.roll_out(situation(points=post), goal, kept)
+    free, margin = gone(PLANNER.sampling.roll_out(situation(), goal, kept)), PLANNER.sampling.margin
+    rooms = np.array([float(rooms_ahead(post, np.array([off]), margin, LIMO)[0]) for off in held.offs])
+    ahead = held.wanted > 0
+    assert gone(held)[ahead] == pytest.approx(np.minimum(free, np.maximum(rooms, 0.0))[ahead])
+    assert 0 < (gone(held)[ahead] < free[ahead] - 0.1).sum() < ahead.sum() / 2

@@ -10,12 +10,12 @@ import numpy as np
 
 from limo_hog.follow.control.rollouts import Sampling
 from limo_hog.follow.control.selection import TrackingState
-from limo_hog.follow.control.situation import Goal, Situation, carried
+from limo_hog.follow.control.situation import Goal, Situation, carried, goal_along
 from limo_hog.follow.decision import Mode
 from limo_hog.follow.parameters import param
-from limo_hog.follow.sense.clearance import NO_POINTS, Margin, from_odometry, rooms_ahead, to_odometry
+from limo_hog.follow.sense.clearance import NO_POINTS, Margin, rooms_ahead, to_odometry
 from limo_hog.follow.sense.measurement import PERSON_RADIUS
-from limo_hog.follow.space.routes import Router, along
+from limo_hog.follow.space.routes import Router
 from limo_hog.follow.tracks.kalman import Track, rates
 from limo_hog.follow.tracks.person import Person
 
@@ -61,7 +61,6 @@ class Following:
     foresight_s: float = param(1.0, "s", "How soon that is, in their way.", 0, 5)
     margin: Margin = field(default_factory=lambda: Margin(0.65, 0.25))
     look_ahead: float = param(1.2, "m", "So much of the direct way must be free, else one is planned.")
-    ahead: float = param(0.5, "m", "The point of a way that is faced is this far off.")
     replan_s: float = param(0.8, "s", "A way is planned anew after this time.")
     router: Router = field(default_factory=Router)
 
@@ -103,9 +102,7 @@ class Following:
         if speed > 0 and person.confirmed:
             state = self._routed(track, bearing, distance, situation, state)
             if len(state.way):
-                x, y = along(state.way, situation.pose, np.array([self.ahead]))[0]
-                places = from_odometry(along(state.way, situation.pose, speed * sampling.times), situation.pose)
-                goal = Goal(situation.bearing_of(x, y), 0.0, speed, speed, places, faces=False)
+                goal = goal_along(state.way, situation, self.router.ahead, speed, sampling.times)
                 reason = "driving around an obstacle"
         return Aimed(goal, Mode.FOLLOW, reason, state)
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from limo_hog.follow.control.situation import Goal, Situation
+from limo_hog.follow.control.situation import Goal, Situation, goal_along
 from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.clearance import NO_POINTS, Points, from_odometry
 from limo_hog.follow.sense.observation import Array, Scan, turn_between
 from limo_hog.follow.space.places import Places, Wandering
-from limo_hog.follow.space.routes import Router, along
+from limo_hog.follow.space.routes import Router
 from limo_hog.follow.tracks.kalman import Track
 
 
@@ -37,7 +37,6 @@ class Lookout:
     speed: float = param(0.6, "m/s", "Highest speed on the way.", 0, 1)
     facing_rate: float = param(1.2, "rad/s", "Highest turn rate to a place: the detector needs sharp frames.", 0, 3)
     search_rate: float = param(0.7, "rad/s", "Turn rate while nothing is known of the person.", 0, 3)
-    ahead: float = param(0.5, "m", "The point of the way that is faced is this far off.")
     arrived: float = param(0.2, "m", "A way ends this near to its last point.")
     replan_s: float = param(0.8, "s", "A way is chosen anew after this time.")
     candidates: int = param(40, "1", "Places to look from that are compared.")
@@ -88,9 +87,7 @@ class Lookout:
         """Return the goal of a rollout whose steps end at `times` [s], and the reason; None to turn on and on."""
         pose = situation.pose
         if len(hunt.way) and math.dist(hunt.way[-1], (pose.x, pose.y)) > self.arrived:
-            x, y = along(hunt.way, pose, np.array([self.ahead]))[0]
-            places = from_odometry(along(hunt.way, pose, self.speed * times), pose)
-            goal = Goal(situation.bearing_of(x, y), 0.0, self.speed, self.speed, places, faces=False)
+            goal = goal_along(hunt.way, situation, self.router.ahead, self.speed, times)
             return goal, "looking round for the lost person"
         if hunt.facing is None:
             return None, "searching for the lost person"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from limo_hog.follow.sense.clearance import Points, from_odometry, places_behind
 from limo_hog.follow.sense.measurement import PERSON_RADIUS
 from limo_hog.follow.sense.observation import Array, Odometry
 from limo_hog.follow.space.grid import Grid, Ground
+from limo_hog.follow.space.routes import along
 
 #: Ground behind the robot is looked at so far behind its outline [m]: from .6 m/s it stops within .33 m.
 DEPTHS = (0.1, 0.2, 0.3)
@@ -64,9 +65,8 @@ class Situation:
         x = poses[..., 0, None] + behind[:, 0] * cos - behind[:, 1] * sin
         y = poses[..., 1, None] + behind[:, 0] * sin + behind[:, 1] * cos
         places = to_odometry(np.stack([x.ravel(), y.ravel()], axis=1), self.pose)
-        hides = np.zeros(len(places), bool)
-        for at_x, at_y, reach in self.hiding.tolist():
-            hides |= np.hypot(places[:, 0] - at_x, places[:, 1] - at_y) < reach
+        at_x, at_y, reach = self.hiding.T
+        hides = (np.hypot(places[:, :1] - at_x, places[:, 1:] - at_y) < reach).any(axis=1)
         within = np.where(hides, fresh_s, KNOWN_S)
         known = self.grid.is_free_since(self.ground, places, self.ground.stamp - within)
         known, risky = known.reshape(x.shape), (hides & ~known).reshape(x.shape)
@@ -91,7 +91,7 @@ class Situation:
 
 def carried(people: Array, pose: Odometry) -> Array:
     """Carry places and velocities (N, 4) from the odometry frame into the base frame of a robot at `pose`."""
-    turned = from_odometry((people - (pose.x, pose.y, 0.0, 0.0)).reshape(-1, 2), replace(pose, x=0.0, y=0.0))
+    turned = from_odometry((people - (pose.x, pose.y, 0.0, 0.0)).reshape(-1, 2), Odometry(yaw=pose.yaw))
     return turned.reshape(-1, 4)
 
 
@@ -108,3 +108,10 @@ class Goal:
     keeps: float = 0.0  #: The distance to hold from it, from the robot's centre [m].
     turn_limit: float = math.inf  #: Highest turn rate [rad/s].
     faces: bool = True  #: Whether it matters that the person followed stays in the image.
+
+
+def goal_along(way: Points, situation: Situation, ahead: float, speed: float, times: Array) -> Goal:
+    """Return the goal to drive along a way (N, 2) [m] at a speed [m/s], facing its point so far `ahead` [m]."""
+    heading = situation.bearing_of(*along(way, situation.pose, np.array([ahead]))[0])
+    places = from_odometry(along(way, situation.pose, speed * times), situation.pose)
+    return Goal(heading, 0.0, speed, speed, places, faces=False)

@@ -27,6 +27,7 @@ class Router:
     keep_off: float = param(0.36, "m", "Distance that a way keeps from the middles of occupied cells.")
     keep_off_far: float = param(0.5, "m", "Nearer than this to something, a way counts as longer.")
     detour: float = param(1.0, "1", "By this share.")
+    ahead: float = param(0.5, "m", "The point of a way that is faced is this far off.")
     farthest: float = param(6.0, "m", "Longer ways are not looked for.")
 
     def field(self, grid: Grid, ground: Ground, pose: Odometry) -> Field:

@@ -15,8 +15,9 @@ IDENTITY = Identity()
 def followed(first: Clothes = IN_RED) -> Likeness:
     """Return what is known of a person in red, by all boxes but the `first`, followed for a second, 2 m ahead."""
     known = IDENTITY.begin(person(1, 0.0, clothes=first))
-    for frame in range(1, 11):
-        known = IDENTITY.update(known, at(0.1 * frame, person(1, 0.1 * frame)))
+    for frame in range(1, IDENTITY.settled + 1):
+        stamp = frame / IDENTITY.settled
+        known = IDENTITY.update(known, at(stamp, person(1, stamp)))
     assert known.of(1) > 0.99
     return known
 
@@ -48,6 +49,16 @@ def test_a_person_of_whom_most_of_the_first_boxes_were_odd_is_learnt_by_the_late
         one = person(1, 0.1 * frame, clothes=IN_RED[[0, 0]] if frame < 7 else IN_RED)
         known = IDENTITY.update(known, replace(at(0.1 * frame, one), movers=(legs(one, one.seen),)))
         assert known.of(1) > 0.95
+    assert known.traits.clothes == pytest.approx(IN_RED, abs=0.2)
+
+
+def test_odd_boxes_of_a_whole_second_lose_nobody_whose_legs_are_known_only_half_a_second_later() -> None:
+    known = IDENTITY.begin(person(1, 0.0, clothes=IN_RED[[0, 0]]))
+    for frame in range(1, 91):
+        walker = person(1, 0.1 * frame, clothes=IN_RED[[0, 0]] if frame < 11 else IN_RED)
+        moving = (legs(walker, walker.seen, since=0.5),) if frame > 5 else ()
+        known = IDENTITY.update(known, replace(at(0.1 * frame, walker), movers=moving))
+        assert known.of(1) > 0.9
     assert known.traits.clothes == pytest.approx(IN_RED, abs=0.2)
 
 

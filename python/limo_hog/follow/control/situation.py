@@ -65,10 +65,8 @@ class Situation:
         x = poses[..., 0, None] + behind[:, 0] * cos - behind[:, 1] * sin
         y = poses[..., 1, None] + behind[:, 0] * sin + behind[:, 1] * cos
         places = to_odometry(np.stack([x.ravel(), y.ravel()], axis=1), self.pose)
-        at_x, at_y, reach = self.hiding.T
-        hides = (np.hypot(places[:, :1] - at_x, places[:, 1:] - at_y) < reach).any(axis=1)
-        within = np.where(hides, fresh_s, KNOWN_S)
-        known = self.grid.is_free_since(self.ground, places, self.ground.stamp - within)
+        hides = (np.hypot(*(places[:, None] - self.hiding[:, :2]).transpose(2, 0, 1)) < self.hiding[:, 2]).any(axis=1)
+        known = self.grid.is_free_since(self.ground, places, self.ground.stamp - np.where(hides, fresh_s, KNOWN_S))
         known, risky = known.reshape(x.shape), (hides & ~known).reshape(x.shape)
         return np.asarray(known.all(axis=-1)), np.asarray(risky.any(axis=-1))
 

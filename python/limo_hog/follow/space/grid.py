@@ -75,8 +75,7 @@ class Grid:
         returned = np.isfinite(ranges) & (ranges >= scan.range_min) & (ranges <= scan.range_max)
         # A beam that hits nothing is free as far as it reaches; one that is no number says nothing.
         clear = np.where(np.isnan(ranges) | (ranges < scan.range_min), 0.0, np.minimum(ranges, scan.range_max))
-        beams = beam_directions(scan.angle_min, scan.angle_max, len(ranges))
-        directions = to_odometry(beams, Odometry(yaw=pose.yaw))
+        directions = to_odometry(beam_directions(scan.angle_min, scan.angle_max, len(ranges)), Odometry(yaw=pose.yaw))
         near = returned & (ranges < self.reach)
         ends = np.concatenate([at + ranges[near, None] * directions[near], depths])
         if len(people) and len(ends):

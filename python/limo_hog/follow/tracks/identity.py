@@ -80,7 +80,7 @@ class Identity:
     speed: float = param(WALK, "m/s", "And further off by this for each second since.")
     clear: float = param(6.0, "chi² of 3", "A shirt or trousers that differ by more are not learnt.")
     rate: float = param(0.05, "1", "Share by which one box moves clothes and stature once they are learnt.")
-    settled: int = param(10, "1", "The first boxes of a person followed, of which none contradicts that it is them.")
+    settled: int = param(20, "1", "The first boxes of a person followed, of which none contradicts that it is them.")
     voters: int = param(30, "1", "Boxes whose median is what a person wears; later what differs clearly is not learnt.")
     remembered: int = param(8, "1", "Other people that are remembered.")
 

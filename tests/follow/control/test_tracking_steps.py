@@ -164,18 +164,6 @@ def test_where_what_lasts_is_in_the_way_a_way_is_planned_and_kept_for_a_while() 
         assert (way(lasts, way=old, way_at=NOW - ago) is not old) == anew
 
 
-@pytest.mark.parametrize(("beside_m", "faced"), [(0.2, True), (-0.8, False)])
-def test_on_a_way_round_something_the_camera_stays_on_a_person_whom_it_does_not_hide(
-    beside_m: float, faced: bool
-) -> None:
-    # The person is 45 degrees to the left; the wall, 1 m off in that direction, begins so far left of the line to them.
-    left = np.arange(beside_m, 0.8, 0.02)
-    wall = [*zip((math.sqrt(0.5) * (1.0 - left)).tolist(), (math.sqrt(0.5) * (1.0 + left)).tolist(), strict=True)]
-    decision = step(1, someone(1, 2.0, 2.0), seen=replace(view(), scan=scan_of(wall, NOW)), ground=blocked(*wall))
-    assert decision.reason == "driving around an obstacle" and len(decision.state.way) > 1
-    assert (dict(decision.belief.shares)["in_view"] > 0) == faced
-
-
 def reason_after(seconds: float, *, pillar: bool = False) -> str:
     """What is done, of whose place no map tells, after a person was not measured for so long [s]."""
     world = World(lidar=False)

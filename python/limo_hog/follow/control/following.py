@@ -77,7 +77,7 @@ class Following:
         return self.near_hiding if keeps > self.near_hiding and situation.is_behind(soon) else keeps
 
     def aim(self, followed: Followed, situation: Situation, state: TrackingState, sampling: Sampling) -> Aimed:
-        """Return the goal that holds the distance to a person; the camera stays on them where nothing hides them."""
+        """Return the goal that holds the distance to a person."""
         person, track, bearing, distance, keeps, worth_nearing = followed
         now, stamp = situation.now, state.tracks.stamp or 0.0
         bearing_rate, range_rate = rates(track, situation.pose)
@@ -103,7 +103,6 @@ class Following:
             state = self._routed(track, bearing, distance, situation, state)
             if len(state.way):
                 goal = goal_along(state.way, situation, self.router.ahead, speed, sampling.times)
-                goal = replace(goal, faces=not situation.is_behind(track.place))
                 reason = "driving around an obstacle"
         return Aimed(goal, Mode.FOLLOW, reason, state)
 
